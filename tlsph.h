@@ -1,0 +1,4270 @@
+/*
+tlsph.h - large-strain, fast, thermo-elastic solids by total Lagrangian smoothed particle hydrodynamics, in one header
+
+WHAT IT IS
+  A body is a cloud of particles that keep their neighbours for ever. Each particle carries linear momentum p, the
+  deformation gradient F and, if the scene asks, the cofactor H, the Jacobian J and the total energy E or the entropy
+  eta. Gradients and forces are sums over neighbours; a Riemann-like dissipation keeps them stable; a two-stage
+  Runge-Kutta scheme moves them in time. Sources: Ghavamian et al. 2021 ("000" in the comments) and Lee et al. 2018
+  ("001"). Where the code departs from the papers, the comment there says why.
+
+USE
+  In exactly one C or C++ file:     #define TLSPH_IMPLEMENTATION
+                                    #include "tlsph.h"
+  In all others:                    #include "tlsph.h"
+  Link with -lm; add -fopenmp for threads. A complete program (a beam that swings under its own weight):
+
+    #define TLSPH_IMPLEMENTATION
+    #include "tlsph.h"
+    #include <stdio.h>
+    int main(void) {
+        tlsph_fill fill = tlsph_fill_default(3);            // a box of 4 m x 1 m x 1 m, particles every 0.25 m
+        fill.size[0] = 4; fill.size[1] = 1; fill.size[2] = 1; fill.spacing = 0.25;
+        tlsph_cloud beam; tlsph_error error;
+        if (tlsph_cloud_create(&fill, &beam, &error)) { puts(error.message); return 1; }
+        uint32_t root[1024];
+        tlsph_condition conditions[2] = { tlsph_condition_default(TLSPH_CLAMPED), tlsph_condition_default(TLSPH_ACCELERATION) };
+        conditions[0].particles = root;
+        conditions[0].count = tlsph_select_plane(&beam.particles, 0, 0, 1e-6, root, 1024);   // all particles at X = 0
+        conditions[1].value[1] = -9.81;                                                      // gravity on every particle
+        tlsph_material rubber = tlsph_material_default(TLSPH_NEO_HOOKEAN);
+        rubber.density = 1100; rubber.young = 1e6; rubber.poisson = 0.4;
+        tlsph_desc desc = tlsph_desc_default(3);
+        desc.particles = beam.particles;
+        desc.materials = &rubber;      desc.material_count = 1;
+        desc.conditions = conditions;  desc.condition_count = 2;
+        tlsph_solver *solver;
+        if (tlsph_create(&desc, &solver, &error)) { puts(error.message); return 1; }
+        while (tlsph_time(solver) < 1) if (tlsph_step(solver, 0.01)) { puts(tlsph_last_error(solver)->message); break; }
+        tlsph_ledger ledger; tlsph_ledger_read(solver, &ledger);
+        printf("t = %g s, kinetic energy %g J, residual %g J\n", ledger.time, ledger.kinetic_energy, ledger.energy_residual);
+        tlsph_destroy(solver); tlsph_cloud_destroy(&beam); return 0;
+    }
+
+OPTIONS (define before including, the same in every file)
+  TLSPH_IMPLEMENTATION   compile the code here                      TLSPH_STATIC   make every function static
+  TLSPH_REAL_FLOAT       float instead of double; a file compiled with the other precision does not link
+  TLSPH_ASSERT(x)        own assertion for internal invariants, default none
+  TLSPH_MALLOC(n), TLSPH_FREE(p)   the default allocator (both or neither); a description may bring its own
+
+PROMISES
+  Units: any coherent set; SI in all examples. Vectors the host passes have 3 components and tensors 9, row-major, first
+  index spatial, in 2-D (plane strain) too; the solver itself stores only what the dimension and the unknowns need.
+  Determinism: every sum has a fixed order, so results are bitwise the same for any number of threads, run after run.
+  Threads: different solvers may be used on different threads at once; one solver by one thread at a time.
+  Memory: one block per solver, taken at creation; a step allocates nothing. Nothing prints, exits or keeps globals.
+  Errors: every function that can fail returns a tlsph_result and says in a tlsph_error what was found and what is
+  allowed; a failed creation leaves nothing behind, a failed step leaves the state of the last good step.
+
+INDEX (search for the tag)
+  [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [MATERIALS]
+  [DISSIPATION] [GRADIENTS] [FLUXES] [CONDITIONS] [RHS] [PROJECTION] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION]
+  [CREATION] [FILL] [LICENCE]
+*/
+#ifndef TLSPH_H
+#define TLSPH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define TLSPH_VERSION_MAJOR 0
+#define TLSPH_VERSION_MINOR 1
+
+#ifdef TLSPH_STATIC
+#define TLSPH_API static
+#else
+#define TLSPH_API extern
+#endif
+
+/* A float build renames what creates solvers and clouds, so that mixing precisions fails at link time, not at run time. */
+#ifdef TLSPH_REAL_FLOAT
+typedef float tlsph_real;
+#define tlsph_create tlsph_create_float
+#define tlsph_cloud_create tlsph_cloud_create_float
+#else
+typedef double tlsph_real;
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ==== [API-TYPES] ================================================================================================== */
+
+/* Every result with its text: one list makes the codes and tlsph_result_text. */
+#define TLSPH_RESULTS(X)                                                                                                \
+    X(TLSPH_OK, "no error")                                                                                             \
+    X(TLSPH_ERROR_DESCRIPTION, "the description was not made by tlsph_..._default, or one of its values is not allowed") \
+    X(TLSPH_ERROR_ARGUMENT, "an argument of the call is not allowed")                                                   \
+    X(TLSPH_ERROR_SIZE, "a size or count does not fit")                                                                 \
+    X(TLSPH_ERROR_NOT_FINITE, "a value is infinite or not a number")                                                    \
+    X(TLSPH_ERROR_VOLUME, "a volume or kernel weight is not positive")                                                  \
+    X(TLSPH_ERROR_DUPLICATE, "two particles are at the same place")                                                     \
+    X(TLSPH_ERROR_NEIGHBOURS, "a particle has too few neighbours, or they lie in a plane or on a line")                 \
+    X(TLSPH_ERROR_MATERIAL, "a material constant is out of its range")                                                  \
+    X(TLSPH_ERROR_CONDITION, "a boundary condition or load is not allowed")                                             \
+    X(TLSPH_ERROR_MEMORY, "no memory")                                                                                  \
+    X(TLSPH_ERROR_INVERSION, "a particle turned inside out: its Jacobian is not positive")                              \
+    X(TLSPH_ERROR_TEMPERATURE, "a temperature is not positive")                                                         \
+    X(TLSPH_ERROR_TIME_STEP, "the time step is not positive or has collapsed")                                          \
+    X(TLSPH_ERROR_FIELD, "the scene has no such field, or it cannot be written")                                        \
+    X(TLSPH_ERROR_CHECKPOINT, "the data is no checkpoint of this scene, or it is damaged")
+
+typedef enum tlsph_result {
+#define TLSPHI_RESULT(name, text) name,
+    TLSPH_RESULTS(TLSPHI_RESULT)
+#undef TLSPHI_RESULT
+    TLSPH_RESULT_COUNT
+} tlsph_result;
+
+#define TLSPH_NO_PARTICLE ((size_t)-1)
+
+/* What went wrong, and where. `particle` is the host's number or TLSPH_NO_PARTICLE. */
+typedef struct tlsph_error {
+    tlsph_result result;
+    const char *stage;     /* what was being done, for instance "create" or "step" */
+    const char *field;     /* the value concerned, for instance "volume" */
+    size_t particle;
+    double value, limit;   /* what was found and the bound that it broke */
+    double time;           /* s, at which the last good step ended */
+    uint64_t step;
+    double position[3];    /* of the particle, m; in steps also: */
+    double stretches[3];   /* principal stretches, largest first */
+    double temperature;    /* K */
+    size_t neighbours;
+    char message[256];     /* all of it in a sentence */
+} tlsph_error;
+
+/* Which deformation measures are evolved beside momentum p and deformation gradient F. */
+typedef enum tlsph_unknowns {
+    TLSPH_PF,   /* {p,F}: H and J follow from F; sturdiest and cheapest; the default, for nu below about 0.49 */
+    TLSPH_PFJ,  /* {p,F,J}: smooth pressure near incompressibility */
+    TLSPH_PFHJ, /* {p,F,H,J}: the papers' full set */
+    TLSPH_PFH   /* {p,F,H}: for comparison (000 section 7.4) */
+} tlsph_unknowns;
+
+/* Which thermal unknown is evolved. */
+typedef enum tlsph_thermal {
+    TLSPH_ISOTHERMAL, /* none: no energy, entropy or temperature is stored */
+    TLSPH_ENERGY,     /* total energy E per reference volume (000-54e): exact balance, right at shocks */
+    TLSPH_ENTROPY     /* entropy eta per reference volume (000-57) */
+} tlsph_thermal;
+
+typedef enum tlsph_kernel { TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC } tlsph_kernel;
+
+/* How volumes, pair vectors C_ab and boundary area vectors B_a are made. All later code sees only these. */
+typedef enum tlsph_operator_kind {
+    TLSPH_CORRECTED_KERNEL, /* C_ab = 2 V_a w_b L_a grad W_ab (000-51, 52); any cloud; exact for linear fields */
+    TLSPH_CELLS,            /* dual faces of box cells whose corners are the particles: antisymmetric, closed, exact */
+    TLSPH_GIVEN             /* the host's own pair vectors, antisymmetric: C_ab = -C_ba */
+} tlsph_operator_kind;
+
+typedef enum tlsph_dissipation {
+    TLSPH_LIMITED,       /* linear reconstruction with a sign-preserving limiter: second order, entropy-stable; default */
+    TLSPH_RECONSTRUCTED, /* linear reconstruction, no limiter: second order, breaks the entropy inequality in places */
+    TLSPH_FIRST_ORDER,   /* raw jumps: robust and very diffusive */
+    TLSPH_AS_PRINTED,    /* 000 (66), (73)-(76), raw jumps of v/Xi: not Galilean invariant, singular; for comparison */
+    TLSPH_NO_DISSIPATION /* unstable sooner or later; for comparison */
+} tlsph_dissipation;
+
+/* How J enters the energy where it is evolved. */
+typedef enum tlsph_volume_coupling {
+    TLSPH_SPLIT,           /* only the volumetric energy sees J, bound to det F by a drift potential; default */
+    TLSPH_JOINT_AS_PRINTED /* psi(F,H,J) with independent arguments (000-28, 30): drifts; for comparison */
+} tlsph_volume_coupling;
+
+typedef enum tlsph_conduction {
+    TLSPH_COMPACT,        /* double gradient plus a two-point part that damps odd-even modes; default */
+    TLSPH_DOUBLE_GRADIENT /* 000 (56): keeps odd-even temperatures for ever */
+} tlsph_conduction;
+
+typedef enum tlsph_integrator {
+    TLSPH_RK2 /* two-stage total-variation-diminishing Runge-Kutta (000-77) */
+} tlsph_integrator;
+
+typedef enum tlsph_material_kind {
+    TLSPH_LINEAR,      /* linear (thermo-)elasticity: geometry linearised, H = I */
+    TLSPH_NEO_HOOKEAN, /* nearly incompressible neo-Hookean or Mooney-Rivlin, no thermal expansion */
+    TLSPH_MEE,         /* modified entropic elasticity (000-26 to 29) */
+    TLSPH_MIE_GRUNEISEN, /* (000-30 to 32) */
+    TLSPH_USER         /* the host's own, by a callback over arrays */
+} tlsph_material_kind;
+
+/* What a user's material returns for one particle: reference energy e_R(F,J) and reference entropy eta_R(F,J) per
+   reference volume (at reference temperature), with derivatives. Stress and temperature follow as
+   P = e_F - theta eta_F + (e_J - theta eta_J) H,  Sigma_J = e_J - theta eta_J.
+   In scenes that do not evolve J, J = det F; then everything may be put into e_F and e_J = eta_J = 0. */
+typedef struct tlsph_response {
+    tlsph_real energy, entropy;         /* J/m^3, J/(m^3 K) */
+    tlsph_real e_F[9], eta_F[9];        /* derivatives by F at fixed J: Pa, Pa/K */
+    tlsph_real e_J, eta_J;              /* derivatives by J at fixed F: Pa, Pa/K */
+    tlsph_real p_modulus[2];            /* bound of rho c_p^2 (isentropic) = [0] + theta [1], Pa, at this F and J */
+    tlsph_real s_modulus[2];            /* of rho c_s^2 */
+} tlsph_response;
+
+/* Fills out[0..count). F: 9 per particle, J: 1, particle: the host's numbers. Must be pure and thread-safe. */
+typedef void (*tlsph_response_fn)(void *user, size_t count, const uint32_t *particle, const tlsph_real *F,
+                                  const tlsph_real *J, tlsph_response *out);
+
+typedef struct tlsph_material {
+    tlsph_material_kind kind;
+    tlsph_real density;               /* rho_R, kg/m^3, > 0 */
+    tlsph_real young;                 /* E, Pa, > 0; for TLSPH_USER the scale of stiffness */
+    tlsph_real poisson;               /* nu, in (-1, 0.5) */
+    tlsph_real expansion;             /* linear thermal expansion alpha, 1/K, >= 0 */
+    tlsph_real specific_heat;         /* C_v per mass, J/(kg K), > 0 in thermal scenes */
+    tlsph_real conductivity;          /* h, W/(m K), >= 0 */
+    tlsph_real reference_temperature; /* theta_R, K, > 0 */
+    tlsph_real gruneisen_exponent;    /* q of (000-31), in [0, 1], default 1 */
+    tlsph_real mooney_fraction;       /* share of the shear modulus carried by the H term, in [0, 1], default 0 */
+    tlsph_response_fn response;       /* for TLSPH_USER */
+    void *response_user;
+} tlsph_material;
+
+/* Everything a material gives at one state (see tlsph_material_evaluate). Tensors 3x3 row-major. */
+typedef struct tlsph_material_state {
+    tlsph_real P[9];                            /* first Piola-Kirchhoff stress, Pa */
+    tlsph_real Sigma_F[9], Sigma_H[9], Sigma_J; /* conjugates of F, H, J at fixed entropy (000-10), Pa */
+    tlsph_real theta, eta;                      /* temperature, K; entropy, J/(m^3 K) */
+    tlsph_real internal_energy, helmholtz;      /* J/m^3 */
+    tlsph_real c_p, c_s;                        /* bounds of the material wave speeds, m/s: isentropic, over all directions */
+} tlsph_material_state;
+
+/* Boundary conditions, loads and contact. Angle brackets: what `value` means. */
+typedef enum tlsph_condition_kind {
+    TLSPH_CLAMPED,       /* v = 0 */
+    TLSPH_ROLLER,        /* v.N = 0: a symmetry plane; fields are mirrored across it (gradients know) */
+    TLSPH_TANGENT,       /* v - (v.N) N = 0: skew-symmetry plane, free along its normal N */
+    TLSPH_VELOCITY,      /* <velocity, m/s>; with a non-zero normal only the component along it */
+    TLSPH_FORCE,         /* <force on each particle, N> */
+    TLSPH_TRACTION,      /* <force per reference area, Pa>; see `areas` */
+    TLSPH_PRESSURE,      /* <pressure, Pa, value[0]>: pushes along the deformed normal -H A; see `areas` */
+    TLSPH_BODY_FORCE,    /* <force per reference volume, N/m^3> */
+    TLSPH_ACCELERATION,  /* <m/s^2>, for instance gravity */
+    TLSPH_TEMPERATURE,   /* <K, value[0]>, prescribed */
+    TLSPH_HEAT_FLUX,     /* <W/m^2, value[0]> per reference area, positive = heat LEAVES the body; see `areas` */
+    TLSPH_HEAT_SOURCE,   /* <W/m^3, value[0]> per reference volume */
+    TLSPH_WALL           /* rigid frictionless wall through `point`, `normal` pointing away from the wall to the body */
+} tlsph_condition_kind;
+
+/* Called once a stage for the whole set. values: 3 per particle for vectors, 1 for scalars, filled with `value` before
+   the call. X, x: reference and current positions, 3 per particle. time: of the stage, s. */
+typedef void (*tlsph_values_fn)(void *user, tlsph_real time, size_t count, const uint32_t *particle,
+                                const tlsph_real *X, const tlsph_real *x, tlsph_real *values);
+
+typedef struct tlsph_condition {
+    uint32_t cookie;             /* set by tlsph_condition_default */
+    tlsph_condition_kind kind;
+    const uint32_t *particles;   /* host numbers; NULL with count 0: all particles. Copied at creation */
+    size_t count;
+    tlsph_real value[3];
+    tlsph_real normal[3];        /* reference normal N of the plane, need not be of unit length */
+    tlsph_real point[3];         /* TLSPH_WALL */
+    const tlsph_real *areas;     /* traction, heat flux: m^2 a particle; pressure: 3 a particle, outward. Copied.
+                                    NULL: the operator's boundary area vector, projected on `normal` where it is given */
+    tlsph_values_fn values;      /* NULL: constant */
+    void *values_user;
+    int conducts;                /* TLSPH_ROLLER: 1 if heat crosses the plane, so that the temperature is not mirrored */
+} tlsph_condition;
+
+/* The particles of a body. All arrays are in the host's order and copied at creation. */
+typedef struct tlsph_particles {
+    size_t count;
+    const tlsph_real *positions;  /* X, 3 each, m (2-D: the third is ignored) */
+    const tlsph_real *volumes;    /* V_a, tributary volume, m^3 (2-D: m^2), > 0: mass, force balance, loads */
+    const tlsph_real *weights;    /* w_a, kernel weight (full cell volume also at faces); NULL: volumes */
+    const uint8_t *materials;     /* index into the description's materials; NULL: all 0 */
+    tlsph_real spacing;           /* smoothing length h = support x spacing; 0: (mean weight)^(1/dimension) */
+    size_t cell_count;            /* TLSPH_CELLS: */
+    const uint32_t *cells;        /* 8 corners a cell (4 in 2-D), numbered x fastest, then y, then z */
+    const size_t *first;          /* TLSPH_GIVEN: count + 1 offsets into */
+    const uint32_t *neighbours;   /* neighbour lists, host numbers */
+    const tlsph_real *pair_vectors; /* C_ab, 3 each, m^2 (2-D: m); C_ab = -C_ba */
+} tlsph_particles;
+
+/* The host's allocator. size in release is the one asked for. */
+typedef struct tlsph_allocator {
+    void *(*allocate)(void *user, size_t size);
+    void (*release)(void *user, void *memory, size_t size);
+    void *user;
+} tlsph_allocator;
+
+/* The host's threads: call task(arg, i) once for every i in [0, count), on any threads in any order, then return. */
+typedef void (*tlsph_task_fn)(void *arg, size_t i);
+typedef void (*tlsph_run_fn)(void *user, tlsph_task_fn task, void *arg, size_t count);
+
+/* A scene. Make it with tlsph_desc_default, then set what differs. */
+typedef struct tlsph_desc {
+    uint32_t cookie;
+    int dimension;                       /* 2 (plane strain) or 3 */
+    tlsph_particles particles;
+    const tlsph_material *materials;     size_t material_count;   /* 1 to 256; copied */
+    const tlsph_condition *conditions;   size_t condition_count;  /* applied in this order; copied */
+    tlsph_unknowns unknowns;             /* default TLSPH_PF */
+    tlsph_thermal thermal;               /* default TLSPH_ISOTHERMAL */
+    tlsph_operator_kind operator_kind;   /* default TLSPH_CORRECTED_KERNEL */
+    tlsph_kernel kernel;                 /* default TLSPH_QUADRATIC */
+    tlsph_real support;                  /* h / spacing, default 0.6 (6 neighbours on a lattice); neighbours within 2h */
+    tlsph_dissipation dissipation;       /* default TLSPH_LIMITED */
+    tlsph_volume_coupling volume_coupling; /* default TLSPH_SPLIT */
+    tlsph_real drift_stiffness;          /* b0 of the drift potential W, default 1 (METHOD: J equation) */
+    tlsph_real drift_scale;              /* phi_c of W, default 0.03 */
+    tlsph_real jump_share;               /* a_J, factor of the dissipation of J, default 0.5 */
+    tlsph_real drift_relaxation;         /* r0: relaxation of J towards det F, default 0 = none; 0.5 for long static loads */
+    tlsph_conduction conduction;         /* default TLSPH_COMPACT */
+    int mirror_gradients;                /* 1: gradients know rollers and tangent planes; default 1 */
+    int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
+    int projection;                      /* 1: angular-momentum projection (000-79 to 82); default 1 */
+    tlsph_integrator integrator;         /* default TLSPH_RK2 */
+    tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1] */
+    int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
+    int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
+    tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP if enabled, else serial */
+    tlsph_allocator allocator;           /* zero: TLSPH_MALLOC and TLSPH_FREE */
+    void *memory;                        size_t memory_size;      /* caller's block for the solver (tlsph_measure), or NULL */
+} tlsph_desc;
+
+/* What a solver of a description needs (see tlsph_measure). */
+typedef struct tlsph_size {
+    size_t bytes;              /* of the one block */
+    size_t bytes_per_particle; /* of it, without pairs, rounded down */
+    size_t bytes_per_pair;
+    size_t pairs;              /* directed neighbour pairs */
+    size_t neighbours_least, neighbours_most;
+} tlsph_size;
+
+/* Balances of the whole scene at the current time. Energies in J (2-D: J/m). Cumulative since creation or tlsph_ledger_reset. */
+typedef struct tlsph_ledger {
+    double time; uint64_t step; double time_step;
+    double mass, linear_momentum[3], angular_momentum[3]; /* about the origin */
+    double centre[3];                                     /* centre of mass */
+    double kinetic_energy;
+    double strain_energy;    /* e_R (thermal) or Helmholtz energy at theta_R (isothermal) */
+    double thermal_energy;   /* c_v (theta - theta_R) */
+    double total_energy;     /* sum of the three */
+    double ballistic_energy; /* total - theta_R entropy; isothermal: total */
+    double entropy;          /* J/K; 0 if isothermal */
+    double dissipation;            /* cumulative work turned into heat by D_p and D_J */
+    double dissipation_entropy;    /* cumulative entropy made of it */
+    double conduction_entropy;     /* cumulative entropy made by heat conduction */
+    double external_work;          /* cumulative, of loads and driven particles */
+    double external_heat;          /* cumulative, into the body: sources, fluxes, prescribed temperatures */
+    double external_entropy;       /* cumulative, that came with the external heat */
+    double projection_work;        /* cumulative work of the projection on the rigid motion: what the dissipation had taken from it */
+    double contact_loss;           /* cumulative kinetic energy stopped by walls (thermal scenes: turned into heat) */
+    double impulse[3], angular_impulse[3]; /* cumulative, of loads (not of constraint reactions) */
+    double energy_residual;        /* total - initial - work - heat (- losses where these leave the energy) */
+    double linear_residual[3];     /* momentum - initial - impulse; the reactions of constraints show here */
+    double angular_residual[3];
+    double entropy_residual;       /* entropy - initial - the three productions: the time scheme's own */
+    double least_pair_production;  /* audit: least pair production since the reset / size of its terms; >= -1e-12 */
+    double drift_largest;          /* largest |J / det F - 1| now */
+    double jacobian_least;         /* least det F or J now */
+    double temperature_least, temperature_largest;
+} tlsph_ledger;
+
+/* Fields that can be read, with name, unit, components and what may be written. One list makes the codes, names and units. */
+#define TLSPH_FIELDS(X)                                                                                                \
+    X(TLSPH_FIELD_REFERENCE_POSITION, "reference_position", "m", 3, 0)                                                 \
+    X(TLSPH_FIELD_POSITION, "position", "m", 3, 1)                                                                     \
+    X(TLSPH_FIELD_DISPLACEMENT, "displacement", "m", 3, 0)                                                             \
+    X(TLSPH_FIELD_VELOCITY, "velocity", "m/s", 3, 1)             /* writing keeps the temperature */                   \
+    X(TLSPH_FIELD_MOMENTUM, "momentum", "kg/(m^2 s)", 3, 0)      /* p per reference volume */                          \
+    X(TLSPH_FIELD_F, "deformation_gradient", "1", 9, 1)          /* writing sets H, J too, keeps the temperature */    \
+    X(TLSPH_FIELD_H, "cofactor", "1", 9, 0)                                                                            \
+    X(TLSPH_FIELD_J, "jacobian", "1", 1, 1)                      /* writable where it is evolved */                    \
+    X(TLSPH_FIELD_DRIFT, "jacobian_drift", "1", 1, 0)            /* J / det F - 1 */                                   \
+    X(TLSPH_FIELD_TEMPERATURE, "temperature", "K", 1, 1)                                                               \
+    X(TLSPH_FIELD_ENERGY, "total_energy", "J/m^3", 1, 0)                                                               \
+    X(TLSPH_FIELD_ENTROPY, "entropy", "J/(m^3 K)", 1, 0)                                                               \
+    X(TLSPH_FIELD_STRESS, "first_piola_kirchhoff_stress", "Pa", 9, 0)                                                  \
+    X(TLSPH_FIELD_PRESSURE, "pressure", "Pa", 1, 0)              /* P:F/(3J), tension positive as in the papers */     \
+    X(TLSPH_FIELD_VON_MISES, "von_mises_stress", "Pa", 1, 0)                                                           \
+    X(TLSPH_FIELD_SIGMA_F, "sigma_F", "Pa", 9, 0)                                                                      \
+    X(TLSPH_FIELD_SIGMA_H, "sigma_H", "Pa", 9, 0)                                                                      \
+    X(TLSPH_FIELD_SIGMA_J, "sigma_J", "Pa", 1, 0)                                                                      \
+    X(TLSPH_FIELD_INTERNAL_ENERGY, "internal_energy", "J/m^3", 1, 0)                                                   \
+    X(TLSPH_FIELD_HELMHOLTZ_ENERGY, "helmholtz_energy", "J/m^3", 1, 0)                                                 \
+    X(TLSPH_FIELD_P_WAVE_SPEED, "p_wave_speed", "m/s", 1, 0)                                                           \
+    X(TLSPH_FIELD_S_WAVE_SPEED, "s_wave_speed", "m/s", 1, 0)                                                           \
+    X(TLSPH_FIELD_VELOCITY_GRADIENT, "velocity_gradient", "1/s", 9, 0) /* of the last stage, by X */                   \
+    X(TLSPH_FIELD_VOLUME, "volume", "m^3", 1, 0)                                                                       \
+    X(TLSPH_FIELD_MASS, "mass", "kg", 1, 0)                                                                            \
+    X(TLSPH_FIELD_BOUNDARY_AREA, "boundary_area", "m^2", 3, 0)   /* B_a = -sum_b C_ab^skew, outward */                 \
+    X(TLSPH_FIELD_NEIGHBOURS, "neighbours", "1", 1, 0)                                                                 \
+    X(TLSPH_FIELD_BODY, "body", "1", 1, 0)                       /* connected part that the particle belongs to */
+
+typedef enum tlsph_field {
+#define TLSPHI_FIELD(id, name, unit, components, writable) id,
+    TLSPH_FIELDS(TLSPHI_FIELD)
+#undef TLSPHI_FIELD
+    TLSPH_FIELD_COUNT
+} tlsph_field;
+
+/* Shapes that tlsph_cloud_create fills with a lattice: a cell belongs to the body if its centre does. */
+typedef enum tlsph_shape {
+    TLSPH_BOX,      /* origin, size */
+    TLSPH_L_SHAPE,  /* the box without the quadrant X > origin + notch in the first two directions */
+    TLSPH_CYLINDER, /* in the box, along `axis`, largest radius that fits; hollow with inner_radius. 2-D: a disk or ring */
+    TLSPH_SPHERE,   /* in the box; hollow with inner_radius */
+    TLSPH_PREDICATE /* where inside(user, X) is not 0, within the box */
+} tlsph_shape;
+typedef enum tlsph_placement {
+    TLSPH_ON_FACES,     /* particles at cell corners, on the faces of the body, with tributary volumes; default */
+    TLSPH_CELL_CENTRED  /* particles at cell centres, equal volumes */
+} tlsph_placement;
+typedef int (*tlsph_inside_fn)(void *user, const tlsph_real X[3]);
+
+typedef struct tlsph_fill {
+    uint32_t cookie;
+    int dimension;
+    tlsph_shape shape;
+    tlsph_real origin[3], size[3];  /* m, of the box around the shape */
+    tlsph_real notch[2];            /* TLSPH_L_SHAPE */
+    tlsph_real inner_radius;        /* m; TLSPH_CYLINDER, TLSPH_SPHERE */
+    int axis;                       /* TLSPH_CYLINDER: 0, 1 or 2 */
+    tlsph_real spacing;             /* m; rounded in each direction so that the box holds whole cells */
+    tlsph_placement placement;
+    tlsph_real jitter;              /* each interior coordinate is moved by up to jitter x spacing / 2 ... x 1, in [0, 0.45] */
+    uint64_t seed;                  /* of the jitter */
+    tlsph_inside_fn inside;         /* TLSPH_PREDICATE */
+    void *inside_user;
+    tlsph_allocator allocator;
+} tlsph_fill;
+
+/* A cloud that owns its arrays. `particles` goes into the description as it is. */
+typedef struct tlsph_cloud {
+    tlsph_particles particles;
+    tlsph_real cell_size[3];
+    void *memory; size_t memory_size; tlsph_allocator allocator;
+} tlsph_cloud;
+
+/* A solver's discrete operator, read-only, in the solver's own order (see tlsph_operator_view).
+   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab, with C_ab = M_a g_ab and M_a = I where correction is NULL. */
+typedef struct tlsph_operator {
+    size_t count, pairs;
+    int dimension;
+    const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1 */
+    const uint32_t *neighbours;    /* b, solver's order */
+    const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric */
+    const tlsph_real *correction;  /* M_a, dimension^2 each, or NULL */
+    const tlsph_real *volumes;     /* V_a */
+    const tlsph_real *boundary;    /* B_a, `dimension` each */
+    const tlsph_real *spacing;     /* tau_a, the length that the time step sees */
+    const uint32_t *host;          /* host number of each */
+} tlsph_operator;
+
+/* Both sides of a pair for tlsph_pair_dissipation. 3-D; tensors row-major. */
+typedef struct tlsph_pair_side {
+    tlsph_real velocity[3], velocity_gradient[9];
+    tlsph_real Sigma_J, Sigma_J_gradient[3];
+    tlsph_real theta, theta_R;
+    tlsph_real density, c_p, c_s, drift_ratio; /* k = W''(phi)/kappa */
+} tlsph_pair_side;
+typedef struct tlsph_pair_flux { tlsph_real D_p[3], D_J, D_E, production; } tlsph_pair_flux;
+
+typedef struct tlsph_solver tlsph_solver;
+
+/* ==== [API-FUNCTIONS] ==============================================================================================
+   By lifetime. `error` may be NULL everywhere. Unless said otherwise a function may be called for different solvers on
+   different threads at once, and costs O(count). */
+
+/* -- describe -- */
+TLSPH_API tlsph_desc tlsph_desc_default(int dimension);
+TLSPH_API tlsph_material tlsph_material_default(tlsph_material_kind kind);
+TLSPH_API tlsph_condition tlsph_condition_default(tlsph_condition_kind kind);
+TLSPH_API tlsph_fill tlsph_fill_default(int dimension);
+
+/* Fills a shape with particles. ERROR_DESCRIPTION, ERROR_ARGUMENT, ERROR_SIZE, ERROR_MEMORY; then *cloud is empty. */
+TLSPH_API tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *cloud, tlsph_error *error);
+TLSPH_API void tlsph_cloud_destroy(tlsph_cloud *cloud);
+/* Numbers of all particles with |X[axis] - value| <= tolerance (m). Writes at most `capacity`, returns how many there are. */
+TLSPH_API size_t tlsph_select_plane(const tlsph_particles *particles, int axis, tlsph_real value, tlsph_real tolerance,
+                                    uint32_t *out, size_t capacity);
+/* The same for inside(user, X) != 0. */
+TLSPH_API size_t tlsph_select(const tlsph_particles *particles, tlsph_inside_fn inside, void *user, uint32_t *out,
+                              size_t capacity);
+
+/* -- measure and create -- */
+/* Bytes and neighbours that tlsph_create would need; the same checks and errors. */
+TLSPH_API tlsph_result tlsph_measure(const tlsph_desc *desc, tlsph_size *size, tlsph_error *error);
+/* A solver at time 0: undeformed, at rest, at reference temperature, constraints applied. On error *solver is NULL and
+   nothing is kept. All data of the description is copied, so the host may free its arrays. Scratch memory is taken from
+   the allocator and given back before returning. */
+TLSPH_API tlsph_result tlsph_create(const tlsph_desc *desc, tlsph_solver **solver, tlsph_error *error);
+TLSPH_API void tlsph_destroy(tlsph_solver *solver); /* NULL is allowed */
+
+/* -- step -- */
+/* One step of the stable size, but at most dt_limit (s, > 0; infinite allowed). ERROR_INVERSION, ERROR_TEMPERATURE,
+   ERROR_NOT_FINITE, ERROR_TIME_STEP: the state is that of the last good step, readable and saveable; see tlsph_last_error. */
+TLSPH_API tlsph_result tlsph_step(tlsph_solver *solver, tlsph_real dt_limit);
+/* Steps until `time` (s) is met exactly. Does nothing if it is past. */
+TLSPH_API tlsph_result tlsph_advance(tlsph_solver *solver, tlsph_real time);
+TLSPH_API tlsph_real tlsph_time(const tlsph_solver *solver);               /* s */
+TLSPH_API uint64_t tlsph_step_count(const tlsph_solver *solver);
+TLSPH_API tlsph_real tlsph_stable_time_step(const tlsph_solver *solver);   /* s, for the current state */
+TLSPH_API const tlsph_error *tlsph_last_error(const tlsph_solver *solver);
+
+/* -- read and set -- */
+TLSPH_API size_t tlsph_count(const tlsph_solver *solver);
+/* Copies a field into out, in the host's order, `components` reals a particle. ERROR_FIELD where the scene lacks it. */
+TLSPH_API tlsph_result tlsph_read(const tlsph_solver *solver, tlsph_field field, tlsph_real *out);
+/* Sets a writable field from `in`, in the host's order; the old state stays if any value is not allowed. */
+TLSPH_API tlsph_result tlsph_write(tlsph_solver *solver, tlsph_field field, const tlsph_real *in);
+TLSPH_API const char *tlsph_field_name(tlsph_field field);
+TLSPH_API const char *tlsph_field_unit(tlsph_field field);
+TLSPH_API int tlsph_field_components(tlsph_field field);
+/* Number of connected bodies. */
+TLSPH_API size_t tlsph_body_count(const tlsph_solver *solver);
+TLSPH_API void tlsph_operator_view(const tlsph_solver *solver, tlsph_operator *view);
+TLSPH_API void tlsph_size_read(const tlsph_solver *solver, tlsph_size *size);
+TLSPH_API void tlsph_ledger_read(const tlsph_solver *solver, tlsph_ledger *ledger);
+/* Starts the cumulative entries anew from the current state. */
+TLSPH_API void tlsph_ledger_reset(tlsph_solver *solver);
+
+/* -- save -- */
+TLSPH_API size_t tlsph_save_size(const tlsph_solver *solver);
+/* Writes a checkpoint of exactly tlsph_save_size bytes; ERROR_SIZE if `size` is less. */
+TLSPH_API tlsph_result tlsph_save(const tlsph_solver *solver, void *buffer, size_t size);
+/* Continues from a checkpoint saved by a solver of the same description, bitwise as if never interrupted.
+   ERROR_CHECKPOINT for damaged or foreign data; then nothing changes. */
+TLSPH_API tlsph_result tlsph_restore(tlsph_solver *solver, const void *buffer, size_t size);
+
+/* -- low-level pieces, usable alone; thread-safe -- */
+TLSPH_API const char *tlsph_result_text(tlsph_result result);
+/* det F (9, row-major). */
+TLSPH_API tlsph_real tlsph_determinant(const tlsph_real *F);
+/* H = cof F = 1/2 F x F. */
+TLSPH_API void tlsph_cofactor(const tlsph_real *F, tlsph_real *H);
+/* C = A x B, tensor cross product (000, footnote 5): C_iI = e_ijk e_IJK A_jJ B_kK. */
+TLSPH_API void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real *C);
+/* W(r) and dW/dr of a normalised kernel of smoothing length h (m) and support radius 2h in 2 or 3 dimensions. */
+TLSPH_API void tlsph_kernel_evaluate(tlsph_kernel kernel, int dimension, tlsph_real r, tlsph_real h, tlsph_real *W,
+                                     tlsph_real *dW);
+/* All a material gives at deformation gradient F (9) and temperature theta (K), with H = cof F and J = det F.
+   ERROR_MATERIAL for impossible constants, ERROR_INVERSION for det F <= 0, ERROR_TEMPERATURE for theta <= 0. */
+TLSPH_API tlsph_result tlsph_material_evaluate(const tlsph_material *material, const tlsph_real *F, tlsph_real theta,
+                                               tlsph_material_state *out);
+/* Dissipative fluxes into side a of one pair: C, c reference and current area vectors (C_ab^skew, c_ab^skew, m^2),
+   d = X_b - X_a (m), a_J the factor of the J dissipation (0 where J is not evolved). production >= 0 is the power turned
+   into heat, half of it on each side. Source: METHOD section "Dissipation", 000 (66)-(76). */
+TLSPH_API void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_side *a, const tlsph_pair_side *b,
+                                      const tlsph_real C[3], const tlsph_real c[3], const tlsph_real d[3], tlsph_real a_J,
+                                      tlsph_pair_flux *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* TLSPH_H */
+/* ==== [API-END] ==================================================================================================== */
+
+#ifdef TLSPH_IMPLEMENTATION
+#ifndef TLSPH_IMPLEMENTATION_DONE
+#define TLSPH_IMPLEMENTATION_DONE
+
+/* ==== [METHOD] =====================================================================================================
+
+   CONSERVATION LAWS, per undeformed volume (000-1, 3, 14)
+     dp/dt = DIV P + f      dF/dt = grad v      dH/dt = F x grad v      dJ/dt = H : grad v      dx/dt = v
+     dE/dt = DIV(P^T v - Q) + f.v + s           theta deta/dt = -DIV Q + s
+   with P = Sigma_F + Sigma_H x F + Sigma_J H (000-12) and Q = -h/J H^T H grad theta (000-13).
+
+   DISCRETE OPERATOR: volumes V_a, pair vectors C_ab, boundary area vectors B_a = -sum_b C_ab^skew; d_ab = X_b - X_a
+     grad f_a  = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab                                             (000-53)
+     T_a       = sum_b (P_a C_ab - P_b C_ba)/2 + D_p                                            (000-55)
+     V_a dE_a  = sum_b ((P_a C_ab).v_b - (P_b C_ba).v_a)/2 - heat + D_E                         (000-54e)
+   The force is the adjoint of the gradient, so the power of the stresses is P_a : grad v_a in each particle exactly and
+   nothing is lost between momentum and energy. Every builder writes C_ab = M_a g_ab with g_ab = -g_ba, so that
+   P_a C_ab - P_b C_ba = (P_a M_a + P_b M_b) g_ab needs one vector a pair; M = I where C itself is antisymmetric.
+
+   TWO VOLUMES. A particle on a face carries half a cell of mass (V_a), but counts as a whole cell in kernel sums (w_a).
+   With V_a in both places C_ab != -C_ba beside faces and the errors of the swinging cube grow 10 to 100 times.
+
+   SYMBOLS               code            meaning                                        unit
+     p, v                p, v            momentum per volume, velocity                   kg/(m^2 s), m/s
+     F, H, J             F, H, J         deformation gradient, cofactor, Jacobian        1
+     d, phi              d, phi          det F, drift J - d                              1
+     P                   P               first Piola-Kirchhoff stress                    Pa
+     Sigma_J             S               conjugate of J                                  Pa
+     E, eta, theta       E, E, theta     energy or entropy share one array; temperature  J/m^3, J/(m^3 K), K
+     C_ab, g_ab, M_a     g, M            pair vector, its antisymmetric factor           m^2
+     H_a M_a             A               area map that pushes g forward: c = A g         1
+     c_p, c_s            c_p, c_s        isentropic wave speeds (bounds)                 m/s
+     zeta, gamma         zeta, gamma     neo-Hookean and Mooney constants                Pa
+     c_v Gamma_0         beta            thermal stress modulus, 3 kappa alpha           Pa/K
+
+   REFERENCES
+     000  Ghavamian, Lee, Gil, Bonet, Heuze, Stainier, Comput. Methods Appl. Mech. Engrg. 379 (2021) 113736
+     001  Lee, Gil, Ghavamian, Bonet, Comput. Methods Appl. Mech. Engrg. 344 (2019) 209-250 */
+
+/* ==== [SHIMS] ====================================================================================================== */
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifndef TLSPH_MALLOC
+#define TLSPH_MALLOC(n) malloc(n)
+#define TLSPH_FREE(p) free(p)
+#endif
+#ifndef TLSPH_ASSERT
+#define TLSPH_ASSERT(x) ((void)0)
+#endif
+
+#ifdef TLSPH_STATIC
+#define TLSPHI_DEF TLSPH_API
+#else
+#define TLSPHI_DEF
+#endif
+
+#if defined(__GNUC__) || defined(__clang__)
+#define TLSPHI_INLINE static inline __attribute__((always_inline))
+#elif defined(_MSC_VER)
+#define TLSPHI_INLINE static __forceinline
+#else
+#define TLSPHI_INLINE static inline
+#endif
+
+/* gcc leaves loops over the 2 or 3 components rolled at -O2 unless asked; clang unrolls them by itself. */
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 8
+#define TLSPHI_UNROLL _Pragma("GCC unroll 9")
+#else
+#define TLSPHI_UNROLL
+#endif
+
+#ifdef TLSPH_REAL_FLOAT
+#define tlsphi_sqrt sqrtf
+#define tlsphi_cbrt cbrtf
+#define tlsphi_pow powf
+#define tlsphi_exp expf
+#define tlsphi_log logf
+#define tlsphi_abs fabsf
+#else
+#define tlsphi_sqrt sqrt
+#define tlsphi_cbrt cbrt
+#define tlsphi_pow pow
+#define tlsphi_exp exp
+#define tlsphi_log log
+#define tlsphi_abs fabs
+#endif
+
+#define TLSPHI_COOKIE 0x544c5350u /* "TLSP" */
+#define TLSPHI_NONE 0xffffffffu
+#define TLSPHI_LARGEST 1e300      /* stands for "no bound" in reductions */
+#ifdef TLSPH_REAL_FLOAT
+#define TLSPHI_EPSILON 1.1920929e-7
+#else
+#define TLSPHI_EPSILON 2.220446049250313e-16
+#endif
+
+typedef tlsph_real tlsphi_r; /* for short casts of constants */
+#define TLSPHI_R(x) ((tlsphi_r)(x))
+
+TLSPHI_INLINE tlsph_real tlsphi_max(tlsph_real a, tlsph_real b) { return a > b ? a : b; }
+TLSPHI_INLINE tlsph_real tlsphi_min(tlsph_real a, tlsph_real b) { return a < b ? a : b; }
+static double tlsphi_dmax(double a, double b) { return a > b ? a : b; }
+static double tlsphi_dmin(double a, double b) { return a < b ? a : b; }
+
+/* Finite? Asked of the bits, because -ffast-math lets a compiler assume that isfinite is always true. */
+TLSPHI_INLINE int tlsphi_finite(tlsph_real x) {
+#ifdef TLSPH_REAL_FLOAT
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7f800000u) != 0x7f800000u;
+#else
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
+#endif
+}
+static int tlsphi_all_finite(const tlsph_real *x, size_t n) {
+    for (size_t i = 0; i < n; i++) if (!tlsphi_finite(x[i])) return 0;
+    return 1;
+}
+
+/* Fills an error record and returns its result, so that callers can write `return tlsphi_fail(...)`. */
+static tlsph_result tlsphi_fail(tlsph_error *error, tlsph_result result, const char *stage, const char *field,
+                                size_t particle, double value, double limit, const char *allowed) {
+    if (!error) return result;
+    memset(error, 0, sizeof *error);
+    error->result = result;
+    error->stage = stage;
+    error->field = field;
+    error->particle = particle;
+    error->value = value;
+    error->limit = limit;
+    if (particle == TLSPH_NO_PARTICLE)
+        snprintf(error->message, sizeof error->message, "%s: %s; %s is %g, allowed: %s", stage,
+                 tlsph_result_text(result), field, value, allowed);
+    else
+        snprintf(error->message, sizeof error->message, "%s: %s; particle %lu: %s is %g, allowed: %s", stage,
+                 tlsph_result_text(result), (unsigned long)particle, field, value, allowed);
+    return result;
+}
+static void tlsphi_no_error(tlsph_error *error) {
+    if (!error) return;
+    memset(error, 0, sizeof *error);
+    error->stage = "";
+    error->field = "";
+    error->particle = TLSPH_NO_PARTICLE;
+}
+
+TLSPHI_DEF const char *tlsph_result_text(tlsph_result result) {
+    static const char *const texts[] = {
+#define TLSPHI_RESULT(name, text) text,
+        TLSPH_RESULTS(TLSPHI_RESULT)
+#undef TLSPHI_RESULT
+    };
+    return (unsigned)result < (unsigned)TLSPH_RESULT_COUNT ? texts[result] : "no such result";
+}
+
+static void *tlsphi_default_allocate(void *user, size_t size) { (void)user; return TLSPH_MALLOC(size); }
+static void tlsphi_default_release(void *user, void *memory, size_t size) {
+    (void)user; (void)size;
+    TLSPH_FREE(memory);
+}
+static tlsph_allocator tlsphi_allocator(const tlsph_allocator *given) {
+    tlsph_allocator a = *given;
+    if (!a.allocate || !a.release) {
+        a.allocate = tlsphi_default_allocate;
+        a.release = tlsphi_default_release;
+        a.user = NULL;
+    }
+    return a;
+}
+
+/* A bump allocator over one block. With memory == NULL it only counts, so the same code measures and lays out. */
+typedef struct tlsphi_arena { unsigned char *memory; size_t used, size; int overflow; } tlsphi_arena;
+
+static void *tlsphi_take(tlsphi_arena *arena, size_t count, size_t size) {
+    size_t start = (arena->used + 63) & ~(size_t)63;
+    if (size && count > (SIZE_MAX / 4 - start) / size) { arena->overflow = 1; return NULL; }
+    arena->used = start + count * size;
+    if (!arena->memory) return NULL;
+    if (arena->used > arena->size) { arena->overflow = 1; return NULL; }
+    return arena->memory + start;
+}
+#define TLSPHI_TAKE(arena, type, count) ((type *)tlsphi_take((arena), (count), sizeof(type)))
+
+/* ==== [TENSORS] ====================================================================================================
+   Small loops with the dimension as a constant argument: after inlining they are straight code of 2 or 3 components.
+   3x3 tensors are row-major, first index spatial. */
+
+TLSPHI_INLINE tlsph_real tlsphi_dot(int n, const tlsph_real *a, const tlsph_real *b) {
+    tlsph_real sum = a[0] * b[0];
+    TLSPHI_UNROLL for (int i = 1; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+/* y = A x */
+TLSPHI_INLINE void tlsphi_multiply(int n, const tlsph_real *A, const tlsph_real *x, tlsph_real *y) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) y[i] = tlsphi_dot(n, A + i * n, x);
+}
+/* y = A^T x */
+TLSPHI_INLINE void tlsphi_multiply_transposed(int n, const tlsph_real *A, const tlsph_real *x, tlsph_real *y) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) {
+        y[i] = A[i] * x[0];
+        TLSPHI_UNROLL for (int j = 1; j < n; j++) y[i] += A[j * n + i] * x[j];
+    }
+}
+/* y = (A + B) x / 2 */
+TLSPHI_INLINE void tlsphi_multiply_mean(int n, const tlsph_real *A, const tlsph_real *B, const tlsph_real *x, tlsph_real *y) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) {
+        y[i] = (A[i * n] + B[i * n]) * x[0];
+        TLSPHI_UNROLL for (int j = 1; j < n; j++) y[i] += (A[i * n + j] + B[i * n + j]) * x[j];
+        y[i] *= TLSPHI_R(0.5);
+    }
+}
+/* A += a (x) b */
+TLSPHI_INLINE void tlsphi_add_outer(int n, tlsph_real *A, const tlsph_real *a, const tlsph_real *b) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) {
+        TLSPHI_UNROLL for (int j = 0; j < n; j++) A[i * n + j] += a[i] * b[j];
+    }
+}
+/* C = A B */
+TLSPHI_INLINE void tlsphi_product(int n, const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) {
+        TLSPHI_UNROLL for (int j = 0; j < n; j++) {
+            tlsph_real sum = 0;
+            TLSPHI_UNROLL for (int k = 0; k < n; k++) sum += A[i * n + k] * B[k * n + j];
+            C[i * n + j] = sum;
+        }
+    }
+}
+/* C = A B^T */
+TLSPHI_INLINE void tlsphi_product_transposed(int n, const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) {
+        TLSPHI_UNROLL for (int j = 0; j < n; j++) C[i * n + j] = tlsphi_dot(n, A + i * n, B + j * n);
+    }
+}
+/* Plane strain to 3-D: the out-of-plane diagonal entry is `last`. In 3-D a copy. */
+TLSPHI_INLINE void tlsphi_expand(int n, const tlsph_real *A, tlsph_real last, tlsph_real *out) {
+    if (n == 3) { memcpy(out, A, 9 * sizeof *out); return; }
+    out[0] = A[0]; out[1] = A[1]; out[2] = 0;
+    out[3] = A[2]; out[4] = A[3]; out[5] = 0;
+    out[6] = 0;    out[7] = 0;    out[8] = last;
+}
+/* The in-plane part of a 3-D tensor. */
+TLSPHI_INLINE void tlsphi_shrink(int n, const tlsph_real *A, tlsph_real *out) {
+    if (n == 3) { memcpy(out, A, 9 * sizeof *out); return; }
+    out[0] = A[0]; out[1] = A[1];
+    out[2] = A[3]; out[3] = A[4];
+}
+static void tlsphi_identity(tlsph_real *A) {
+    for (int i = 0; i < 9; i++) A[i] = i % 4 == 0;
+}
+
+TLSPHI_DEF tlsph_real tlsph_determinant(const tlsph_real *F) {
+    return F[0] * (F[4] * F[8] - F[5] * F[7]) + F[1] * (F[5] * F[6] - F[3] * F[8]) + F[2] * (F[3] * F[7] - F[4] * F[6]);
+}
+/* Rows of cof F are cross products of the rows of F. */
+TLSPHI_DEF void tlsph_cofactor(const tlsph_real *F, tlsph_real *H) {
+    H[0] = F[4] * F[8] - F[5] * F[7]; H[1] = F[5] * F[6] - F[3] * F[8]; H[2] = F[3] * F[7] - F[4] * F[6];
+    H[3] = F[7] * F[2] - F[8] * F[1]; H[4] = F[8] * F[0] - F[6] * F[2]; H[5] = F[6] * F[1] - F[7] * F[0];
+    H[6] = F[1] * F[5] - F[2] * F[4]; H[7] = F[2] * F[3] - F[0] * F[5]; H[8] = F[0] * F[4] - F[1] * F[3];
+}
+/* (A x B)_iI = e_ijk e_IJK A_jJ B_kK: the polar form of the cofactor, cof(A + B) = cof A + A x B + cof B. */
+TLSPHI_DEF void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
+    for (int i = 0; i < 3; i++) {
+        const int j = 3 * ((i + 1) % 3), k = 3 * ((i + 2) % 3);
+        for (int I = 0; I < 3; I++) {
+            const int J = (I + 1) % 3, K = (I + 2) % 3;
+            C[3 * i + I] = A[j + J] * B[k + K] - A[j + K] * B[k + J] + A[k + K] * B[j + J] - A[k + J] * B[j + K];
+        }
+    }
+}
+
+/* Eigenvalues and vectors (columns of Q) of a symmetric 3x3 by cyclic Jacobi rotations. A is destroyed: its diagonal
+   becomes the eigenvalues, unordered. Only used at creation, in the projection and for error records. */
+static void tlsphi_rotate(double A[9], double Q[9], int p, int q) {
+    const double apq = A[3 * p + q];
+    if (apq == 0) return;
+    const double h = (A[4 * q] - A[4 * p]) / (2 * apq);
+    const double t = (h < 0 ? -1.0 : 1.0) / (fabs(h) + sqrt(h * h + 1));
+    const double c = 1 / sqrt(t * t + 1), s = t * c;
+    for (int k = 0; k < 3; k++) {
+        const double akp = A[3 * k + p], akq = A[3 * k + q];
+        A[3 * k + p] = c * akp - s * akq;
+        A[3 * k + q] = s * akp + c * akq;
+    }
+    for (int k = 0; k < 3; k++) {
+        const double apk = A[3 * p + k], aqk = A[3 * q + k], qkp = Q[3 * k + p], qkq = Q[3 * k + q];
+        A[3 * p + k] = c * apk - s * aqk;
+        A[3 * q + k] = s * apk + c * aqk;
+        Q[3 * k + p] = c * qkp - s * qkq;
+        Q[3 * k + q] = s * qkp + c * qkq;
+    }
+}
+static void tlsphi_eigen(double A[9], double Q[9]) {
+    for (int i = 0; i < 9; i++) Q[i] = i % 4 == 0;
+    for (int sweep = 0; sweep < 12; sweep++) {
+        tlsphi_rotate(A, Q, 0, 1);
+        tlsphi_rotate(A, Q, 0, 2);
+        tlsphi_rotate(A, Q, 1, 2);
+    }
+}
+/* x = A^+ b for symmetric semi-definite A: directions whose eigenvalue is below 1e-12 of the largest are left out. */
+static void tlsphi_solve_symmetric(const double A[9], const double b[3], double x[3]) {
+    double D[9], Q[9];
+    memcpy(D, A, sizeof D);
+    tlsphi_eigen(D, Q);
+    const double largest = tlsphi_dmax(fabs(D[0]), tlsphi_dmax(fabs(D[4]), fabs(D[8])));
+    x[0] = x[1] = x[2] = 0;
+    for (int k = 0; k < 3; k++) {
+        if (fabs(D[4 * k]) <= 1e-12 * largest || D[4 * k] == 0) continue;
+        const double share = (Q[k] * b[0] + Q[3 + k] * b[1] + Q[6 + k] * b[2]) / D[4 * k];
+        for (int i = 0; i < 3; i++) x[i] += share * Q[3 * i + k];
+    }
+}
+/* Principal stretches of F, largest first. */
+static void tlsphi_stretches(const tlsph_real *F, double out[3]) {
+    double C[9], Q[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            C[3 * i + j] = (double)F[i] * (double)F[j] + (double)F[3 + i] * (double)F[3 + j] + (double)F[6 + i] * (double)F[6 + j];
+    tlsphi_eigen(C, Q);
+    for (int i = 0; i < 3; i++) out[i] = sqrt(tlsphi_dmax(C[4 * i], 0));
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < 2; i++)
+            if (out[i] < out[i + 1]) { const double swap = out[i]; out[i] = out[i + 1]; out[i + 1] = swap; }
+}
+/* Upper bound of the largest eigenvalue of a 3x3 semi-definite tensor from its trace and the trace of its square;
+   exact when the two smaller ones are equal, and much cheaper than the eigenvalue. */
+TLSPHI_INLINE tlsph_real tlsphi_largest_bound(tlsph_real trace, tlsph_real trace_of_square) {
+    const tlsph_real spread = trace_of_square - trace * trace / 3;
+    return trace / 3 + tlsphi_sqrt(TLSPHI_R(2.0 / 3.0) * tlsphi_max(spread, 0));
+}
+
+/* ==== [KERNELS] ====================================================================================================
+   With s = r/h and support s < 2 (h: smoothing length).
+   cubic B-spline:  W = w (1 - 3/2 s^2 + 3/4 s^3) for s < 1,  w/4 (2 - s)^3 beyond;  w = 1/(pi h^3), 2-D: 10/(7 pi h^2)
+   quadratic:       W = w (3/16 s^2 - 3/4 s + 3/4);                                  w = 5/(4 pi h^3), 2-D: 2/(pi h^2)
+   The quadratic one (001 section 3.2) has a gradient that never turns weaker towards r = 0. */
+
+static void tlsphi_kernel(tlsph_kernel kernel, int dimension, double r, double h, double *W, double *dW) {
+    const double pi = 3.14159265358979323846, s = r / h, t = 2 - s;
+    const double volume = dimension == 3 ? h * h * h : h * h;
+    *W = *dW = 0;
+    if (s >= 2) return;
+    if (kernel == TLSPH_QUADRATIC) {
+        const double w = (dimension == 3 ? 1.25 : 2.0) / (pi * volume);
+        *W = w * 0.1875 * t * t;
+        *dW = -w * 0.375 * t / h;
+    } else {
+        const double w = (dimension == 3 ? 1.0 : 10.0 / 7.0) / (pi * volume);
+        *W = s < 1 ? w * (1 - 1.5 * s * s + 0.75 * s * s * s) : w * 0.25 * t * t * t;
+        *dW = (s < 1 ? w * (-3 * s + 2.25 * s * s) : -w * 0.75 * t * t) / h;
+    }
+}
+TLSPHI_DEF void tlsph_kernel_evaluate(tlsph_kernel kernel, int dimension, tlsph_real r, tlsph_real h, tlsph_real *W,
+                                      tlsph_real *dW) {
+    double w, dw;
+    tlsphi_kernel(kernel, dimension, (double)r, (double)h, &w, &dw);
+    *W = (tlsph_real)w;
+    *dW = (tlsph_real)dw;
+}
+
+/* ==== [NEIGHBOURS] =================================================================================================
+   Cells as wide as the largest search radius. Particles are sorted by the Morton (bit-interleaved) number of their cell,
+   which serves twice: equal numbers are the cells' contents, and the order keeps neighbours close in memory. Cells are
+   found again through a hash table of occupied cells, so that sparse scenes cost no more. All O(n); the sort is a radix
+   sort. This is creation only: a total Lagrangian body keeps its neighbours. */
+
+typedef struct tlsphi_grid {
+    size_t count, buckets;
+    int dimension;
+    double low[3], width;     /* corner and edge of the cells, m */
+    uint64_t *key;            /* Morton number of each particle, in sorted order */
+    uint32_t *order;          /* host number, in sorted order */
+    uint32_t *table;          /* hash table: sorted position of a cell's first particle, or TLSPHI_NONE */
+} tlsphi_grid;
+
+#define TLSPHI_GRID_BITS 21 /* per axis: three fit into 63 bits */
+
+/* Spreads 21 bits so that two zeros follow each. */
+static uint64_t tlsphi_spread(uint64_t x) {
+    x &= 0x1fffff;
+    x = (x | x << 32) & 0x1f00000000ffffu;
+    x = (x | x << 16) & 0x1f0000ff0000ffu;
+    x = (x | x << 8) & 0x100f00f00f00f00fu;
+    x = (x | x << 4) & 0x10c30c30c30c30c3u;
+    return (x | x << 2) & 0x1249249249249249u;
+}
+static uint64_t tlsphi_morton(const uint64_t cell[3]) {
+    return tlsphi_spread(cell[0]) | tlsphi_spread(cell[1]) << 1 | tlsphi_spread(cell[2]) << 2;
+}
+static void tlsphi_cell_of(const tlsphi_grid *grid, const tlsph_real *X, uint64_t cell[3]) {
+    cell[2] = 0;
+    for (int i = 0; i < grid->dimension; i++) cell[i] = (uint64_t)(((double)X[i] - grid->low[i]) / grid->width);
+}
+static size_t tlsphi_bucket(const tlsphi_grid *grid, uint64_t key) {
+    return (size_t)((key * 0x9e3779b97f4a7c15u) >> 20) & (grid->buckets - 1);
+}
+/* Sorts (key, order) by key, 8 bits a pass, stable; passes in which all keys agree are skipped. */
+static void tlsphi_radix_sort(uint64_t *key, uint32_t *order, uint64_t *key2, uint32_t *order2, size_t n) {
+    for (int shift = 0; shift < 64; shift += 8) {
+        size_t start[257] = {0};
+        for (size_t i = 0; i < n; i++) start[(key[i] >> shift & 255) + 1]++;
+        if (start[(key[0] >> shift & 255) + 1] == n) continue;
+        for (int d = 0; d < 256; d++) start[d + 1] += start[d];
+        for (size_t i = 0; i < n; i++) {
+            const size_t to = start[key[i] >> shift & 255]++;
+            key2[to] = key[i];
+            order2[to] = order[i];
+        }
+        memcpy(key, key2, n * sizeof *key);
+        memcpy(order, order2, n * sizeof *order);
+    }
+}
+/* First sorted position of the particles in a cell, or TLSPHI_NONE. */
+static uint32_t tlsphi_find_cell(const tlsphi_grid *grid, uint64_t key) {
+    for (size_t b = tlsphi_bucket(grid, key);; b = (b + 1) & (grid->buckets - 1)) {
+        const uint32_t at = grid->table[b];
+        if (at == TLSPHI_NONE || grid->key[at] == key) return at;
+    }
+}
+static void tlsphi_grid_hash(tlsphi_grid *grid) {
+    for (size_t b = 0; b < grid->buckets; b++) grid->table[b] = TLSPHI_NONE;
+    for (size_t i = 0; i < grid->count; i++) {
+        if (i && grid->key[i] == grid->key[i - 1]) continue;
+        size_t b = tlsphi_bucket(grid, grid->key[i]);
+        while (grid->table[b] != TLSPHI_NONE) b = (b + 1) & (grid->buckets - 1);
+        grid->table[b] = (uint32_t)i;
+    }
+}
+
+/* ==== [OPERATORS] ==================================================================================================
+   A plan is what creation works out before it knows how much memory the solver needs: the particles' order, the number
+   of pairs, and whether C is antisymmetric by itself. Each builder answers one question: which neighbours has host
+   particle a, and what is g_ab for each? */
+
+typedef struct tlsphi_scratch { void *memory; size_t size; } tlsphi_scratch;
+
+typedef struct tlsphi_plan {
+    const tlsph_desc *desc;
+    tlsph_allocator allocator;
+    tlsph_error *error;
+    int dim;
+    size_t n, pairs, least, most;    /* particles, directed pairs, fewest and most neighbours */
+    double h;                        /* smoothing length */
+    tlsphi_grid grid;
+    const tlsph_real *weights;       /* w_a */
+    size_t *cell_first;              /* TLSPH_CELLS: cells around each particle, */
+    uint32_t *cell_of;
+    double *volume;                  /* and V_a made of them */
+    double *correction;              /* kernels: M_a, dim x dim each, host order */
+    int antisymmetric;               /* C_ab = -C_ba to round-off: the solver stores C itself */
+    uint32_t *host, *inner;          /* solver order -> host number, and back */
+    uint32_t *body;                  /* of each particle in solver order */
+    size_t bodies, blocks;
+    uint8_t *fixed;                  /* number of constrained directions of each particle (solver order), */
+    double *fixed_direction;         /* and these directions, orthonormal, dim x dim each */
+    size_t fixes, mirrors;           /* how many in all (see [CONDITIONS]) */
+    tlsphi_scratch scratch[24];
+    int scratches;
+} tlsphi_plan;
+
+static void *tlsphi_scratch_take(tlsphi_plan *plan, size_t count, size_t size) {
+    const size_t bytes = count * size + (count == 0);
+    if (size && count > SIZE_MAX / 4 / size) return NULL;
+    void *memory = plan->allocator.allocate(plan->allocator.user, bytes);
+    if (!memory) return NULL;
+    memset(memory, 0, bytes);
+    plan->scratch[plan->scratches].memory = memory;
+    plan->scratch[plan->scratches++].size = bytes;
+    return memory;
+}
+#define TLSPHI_SCRATCH(plan, type, count) ((type *)tlsphi_scratch_take((plan), (count), sizeof(type)))
+
+static void tlsphi_plan_release(tlsphi_plan *plan) {
+    while (plan->scratches > 0) {
+        const tlsphi_scratch *s = &plan->scratch[--plan->scratches];
+        plan->allocator.release(plan->allocator.user, s->memory, s->size);
+    }
+}
+static tlsph_result tlsphi_plan_fail(tlsphi_plan *plan, tlsph_result result, const char *field, size_t particle,
+                                     double value, double limit, const char *allowed) {
+    return tlsphi_fail(plan->error, result, "create", field, particle, value, limit, allowed);
+}
+static tlsph_result tlsphi_no_memory(tlsphi_plan *plan, double bytes) {
+    return tlsphi_plan_fail(plan, TLSPH_ERROR_MEMORY, "bytes", TLSPH_NO_PARTICLE, bytes, 0, "what the allocator can give");
+}
+
+static const tlsph_real *tlsphi_position(const tlsphi_plan *plan, size_t a) { return plan->desc->particles.positions + 3 * a; }
+
+static void tlsphi_difference(const tlsphi_plan *plan, size_t a, size_t b, double d[3]) {
+    const tlsph_real *A = tlsphi_position(plan, a), *B = tlsphi_position(plan, b);
+    d[2] = 0;
+    for (int i = 0; i < plan->dim; i++) d[i] = (double)B[i] - (double)A[i];
+}
+
+/* -- builder 1: kernels. g_ab = 2 w_a w_b grad W_b(X_a); M_a = V_a/w_a L_a (000-51, 52 with two volumes) -- */
+
+/* Neighbours of host particle a within 2h; with list == NULL only counts. */
+static size_t tlsphi_kernel_neighbours(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
+    const tlsphi_grid *grid = &plan->grid;
+    uint64_t cell[3], other[3] = {0, 0, 0};
+    size_t found = 0;
+    tlsphi_cell_of(grid, tlsphi_position(plan, a), cell);
+    const int cells = plan->dim == 3 ? 27 : 9;
+    for (int c = 0; c < cells; c++) {
+        other[0] = cell[0] + (uint64_t)(c % 3) - 1;
+        other[1] = cell[1] + (uint64_t)(c / 3 % 3) - 1;
+        if (plan->dim == 3) other[2] = cell[2] + (uint64_t)(c / 9) - 1;
+        const uint64_t key = tlsphi_morton(other);
+        for (size_t i = tlsphi_find_cell(grid, key); i < grid->count && grid->key[i] == key; i++) {
+            const uint32_t b = grid->order[i];
+            double d[3], W, dW;
+            tlsphi_difference(plan, a, b, d);
+            const double r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            if (b == a || r >= 2 * plan->h) continue;
+            if (list) {
+                tlsphi_kernel(plan->desc->kernel, plan->dim, r, plan->h, &W, &dW);
+                const double factor = r > 0 ? -2 * (double)plan->weights[a] * (double)plan->weights[b] * dW / r : 0;
+                list[found] = b;
+                for (int k = 0; k < plan->dim; k++) g[(size_t)plan->dim * found + (size_t)k] = factor * d[k];
+            }
+            found++;
+        }
+    }
+    return found;
+}
+
+/* -- builder 2: cells. C_ab is the area of the dual face across the edge ab: a quarter (2-D: half) of the cross-section
+   of every cell around the edge. Exact for linear fields and closed on any voxel body, re-entrant edges included. -- */
+
+/* Edge lengths of cell c. */
+static void tlsphi_cell_size(const tlsphi_plan *plan, size_t c, double size[3]) {
+    const uint32_t *corner = plan->desc->particles.cells + (c << plan->dim);
+    double d[3];
+    size[2] = 1;
+    for (int axis = 0; axis < plan->dim; axis++) {
+        tlsphi_difference(plan, corner[0], corner[1 << axis], d);
+        size[axis] = d[axis];
+    }
+}
+static size_t tlsphi_cell_neighbours(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
+    const int dim = plan->dim;
+    uint32_t seen[24];
+    double area[24][3];
+    size_t found = 0;
+    for (size_t i = plan->cell_first[a]; i < plan->cell_first[a + 1]; i++) {
+        const uint32_t *corner = plan->desc->particles.cells + ((size_t)plan->cell_of[i] << dim);
+        double size[3];
+        int me = 0;
+        tlsphi_cell_size(plan, plan->cell_of[i], size);
+        while (corner[me] != a) me++;
+        for (int axis = 0; axis < dim; axis++) {
+            const uint32_t b = corner[me ^ (1 << axis)];
+            const double section = size[0] * size[1] * size[2] / size[axis] / (dim == 3 ? 4 : 2);
+            size_t at = 0;
+            while (at < found && seen[at] != b) at++;
+            if (at == found) {
+                seen[found] = b;
+                area[found][0] = area[found][1] = area[found][2] = 0;
+                found++;
+            }
+            area[at][axis] += (me >> axis & 1) ? -section : section;
+        }
+    }
+    for (size_t i = 0; list && i < found; i++) {
+        list[i] = seen[i];
+        for (int k = 0; k < dim; k++) g[(size_t)dim * i + (size_t)k] = area[i][k];
+    }
+    return found;
+}
+
+/* -- builder 3: the host's own pair vectors -- */
+static size_t tlsphi_given_neighbours(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
+    const tlsph_particles *p = &plan->desc->particles;
+    const size_t found = p->first[a + 1] - p->first[a];
+    for (size_t i = 0; list && i < found; i++) {
+        list[i] = p->neighbours[p->first[a] + i];
+        for (int k = 0; k < plan->dim; k++)
+            g[(size_t)plan->dim * i + (size_t)k] = (double)p->pair_vectors[3 * (p->first[a] + i) + (size_t)k];
+    }
+    return found;
+}
+
+static size_t tlsphi_neighbours_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
+    switch (plan->desc->operator_kind) {
+    case TLSPH_CELLS: return tlsphi_cell_neighbours(plan, a, list, g);
+    case TLSPH_GIVEN: return tlsphi_given_neighbours(plan, a, list, g);
+    default: return tlsphi_kernel_neighbours(plan, a, list, g);
+    }
+}
+static double tlsphi_plan_volume(const tlsphi_plan *plan, size_t a) {
+    return plan->volume ? plan->volume[a] : (double)plan->desc->particles.volumes[a];
+}
+
+/* -- preparations of each builder -- */
+
+static tlsph_result tlsphi_grid_build(tlsphi_plan *plan) {
+    const size_t n = plan->n;
+    tlsphi_grid *grid = &plan->grid;
+    double high[3] = {0, 0, 0};
+    grid->count = n;
+    grid->dimension = plan->dim;
+    grid->width = 2 * plan->h * (1 + 1e-9);
+    for (int i = 0; i < plan->dim; i++) {
+        grid->low[i] = high[i] = (double)tlsphi_position(plan, 0)[i];
+        for (size_t a = 1; a < n; a++) {
+            grid->low[i] = tlsphi_dmin(grid->low[i], (double)tlsphi_position(plan, a)[i]);
+            high[i] = tlsphi_dmax(high[i], (double)tlsphi_position(plan, a)[i]);
+        }
+        grid->low[i] -= 1.5 * grid->width; /* so that cell - 1 never wraps below zero */
+        const double cells = (high[i] - grid->low[i]) / grid->width + 2;
+        if (cells > (double)(1 << TLSPHI_GRID_BITS))
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "extent / support radius", TLSPH_NO_PARTICLE, cells,
+                                    (double)(1 << TLSPHI_GRID_BITS), "less than 2^21; check spacing and positions");
+    }
+    for (grid->buckets = 16; grid->buckets < 2 * n;) grid->buckets *= 2;
+    grid->key = TLSPHI_SCRATCH(plan, uint64_t, n);
+    grid->order = TLSPHI_SCRATCH(plan, uint32_t, n);
+    grid->table = TLSPHI_SCRATCH(plan, uint32_t, grid->buckets);
+    uint64_t *key2 = TLSPHI_SCRATCH(plan, uint64_t, n);
+    uint32_t *order2 = TLSPHI_SCRATCH(plan, uint32_t, n);
+    if (!grid->key || !grid->order || !grid->table || !key2 || !order2) return tlsphi_no_memory(plan, 24.0 * (double)n);
+    for (size_t a = 0; a < n; a++) {
+        uint64_t cell[3];
+        tlsphi_cell_of(grid, tlsphi_position(plan, a), cell);
+        grid->key[a] = tlsphi_morton(cell);
+        grid->order[a] = (uint32_t)a;
+    }
+    tlsphi_radix_sort(grid->key, grid->order, key2, order2, n);
+    tlsphi_grid_hash(grid);
+    return TLSPH_OK;
+}
+
+/* Lists the cells around each particle, checks the cells and makes V_a of them. */
+static tlsph_result tlsphi_cells_build(tlsphi_plan *plan) {
+    const tlsph_particles *p = &plan->desc->particles;
+    const size_t corners = p->cell_count << plan->dim;
+    plan->cell_first = TLSPHI_SCRATCH(plan, size_t, plan->n + 2);
+    plan->cell_of = TLSPHI_SCRATCH(plan, uint32_t, corners);
+    plan->volume = TLSPHI_SCRATCH(plan, double, plan->n);
+    if (!plan->cell_first || !plan->cell_of || !plan->volume) return tlsphi_no_memory(plan, 16.0 * (double)plan->n);
+    for (size_t i = 0; i < corners; i++) {
+        if (p->cells[i] >= plan->n)
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "corner of a cell", TLSPH_NO_PARTICLE, (double)p->cells[i],
+                                    (double)plan->n, "less than the number of particles");
+        plan->cell_first[p->cells[i] + 2]++;
+    }
+    for (size_t a = 0; a < plan->n; a++) plan->cell_first[a + 2] += plan->cell_first[a + 1];
+    for (size_t i = 0; i < corners; i++) plan->cell_of[plan->cell_first[p->cells[i] + 1]++] = (uint32_t)(i >> plan->dim);
+    for (size_t c = 0; c < p->cell_count; c++) {
+        double size[3];
+        tlsphi_cell_size(plan, c, size);
+        for (int axis = 0; axis < plan->dim; axis++)
+            if (!(size[axis] > 0))
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_VOLUME, "edge of a cell", p->cells[c << plan->dim], size[axis], 0,
+                                        "more than 0, corners numbered x fastest");
+        for (int k = 0; k < 1 << plan->dim; k++)
+            plan->volume[p->cells[(c << plan->dim) + (size_t)k]] += size[0] * size[1] * size[2] / (1 << plan->dim);
+    }
+    for (size_t a = 0; a < plan->n; a++)
+        if (!(plan->volume[a] > 0))
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "cells around it", a, 0, 1, "at least 1");
+    return TLSPH_OK;
+}
+
+static tlsph_result tlsphi_given_check(tlsphi_plan *plan) {
+    const tlsph_particles *p = &plan->desc->particles;
+    for (size_t a = 0; a < plan->n; a++) {
+        if (p->first[a + 1] < p->first[a])
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "first", a, (double)p->first[a + 1], (double)p->first[a], "not falling");
+        for (size_t i = p->first[a]; i < p->first[a + 1]; i++) {
+            if (p->neighbours[i] >= plan->n || p->neighbours[i] == a)
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "neighbour", a, (double)p->neighbours[i], (double)plan->n,
+                                        "another particle's number");
+            if (!tlsphi_all_finite(p->pair_vectors + 3 * i, (size_t)plan->dim))
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "pair vector", a, (double)i, 0, "finite");
+        }
+    }
+    return TLSPH_OK;
+}
+
+/* Row-major inverse of a symmetric positive matrix of size 2 or 3, padded to 3x3 with 1 on the diagonal. */
+static void tlsphi_inverse(int n, const double A[9], double out[9]) {
+    const double c00 = A[4] * A[8] - A[5] * A[7], c01 = A[5] * A[6] - A[3] * A[8], c02 = A[3] * A[7] - A[4] * A[6];
+    const double det = A[0] * c00 + A[1] * c01 + A[2] * c02;
+    double inverse[9];
+    inverse[0] = c00; inverse[1] = A[2] * A[7] - A[1] * A[8]; inverse[2] = A[1] * A[5] - A[2] * A[4];
+    inverse[3] = c01; inverse[4] = A[0] * A[8] - A[2] * A[6]; inverse[5] = A[2] * A[3] - A[0] * A[5];
+    inverse[6] = c02; inverse[7] = A[1] * A[6] - A[0] * A[7]; inverse[8] = A[0] * A[4] - A[1] * A[3];
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) out[i * n + j] = inverse[3 * i + j] / det;
+}
+
+/* sum_b g_ab (x) d_ab / 2, padded to 3x3: for kernels w_a L_a^-1, for closed operators V_a I. */
+static tlsph_result tlsphi_moment(tlsphi_plan *plan, size_t a, const uint32_t *list, const double *g, size_t count, double A[9]) {
+    for (int i = 0; i < 9; i++) A[i] = 0;
+    if (plan->dim == 2) A[8] = 1;
+    for (size_t i = 0; i < count; i++) {
+        double d[3] = {0, 0, 0};
+        tlsphi_difference(plan, a, list[i], d);
+        if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= 1e-18 * plan->h * plan->h)
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_DUPLICATE, "same place as particle", a, (double)list[i], 0, "distinct positions");
+        for (int k = 0; k < plan->dim; k++)
+            for (int l = 0; l < plan->dim; l++) A[3 * k + l] += 0.5 * g[(size_t)plan->dim * i + (size_t)k] * d[l];
+    }
+    return TLSPH_OK;
+}
+/* M_a = V_a/w_a L_a, after a check that the neighbours span the space. */
+static tlsph_result tlsphi_correct(tlsphi_plan *plan, size_t a, const double A[9], size_t count, double *M) {
+    double D[9], Q[9];
+    memcpy(D, A, sizeof D);
+    if (plan->dim == 2) D[8] = D[0] + D[4];
+    tlsphi_eigen(D, Q);
+    double least = D[0], largest = D[0];
+    for (int i = 1; i < plan->dim; i++) {
+        least = tlsphi_dmin(least, D[4 * i]);
+        largest = tlsphi_dmax(largest, D[4 * i]);
+    }
+    if (count < (size_t)plan->dim || !(least > 1e-8 * largest))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "neighbours", a, (double)count, plan->dim,
+                                plan->dim == 3 ? "3 or more, not in a plane; or raise `support`"
+                                               : "2 or more, not on a line; or raise `support`");
+    tlsphi_inverse(plan->dim, A, M);
+    for (int i = 0; i < plan->dim * plan->dim; i++) M[i] *= tlsphi_plan_volume(plan, a);
+    return TLSPH_OK;
+}
+
+/* Union-find over the pairs: connected particles are one body (projection, [PROJECTION]). */
+static uint32_t tlsphi_root(uint32_t *parent, uint32_t a) {
+    while (parent[a] != a) a = parent[a] = parent[parent[a]];
+    return a;
+}
+static void tlsphi_join(uint32_t *parent, uint32_t a, uint32_t b) {
+    a = tlsphi_root(parent, a);
+    b = tlsphi_root(parent, b);
+    if (a < b) parent[b] = a; else parent[a] = b;
+}
+
+/* Goes once over all particles: counts neighbours, builds M_a, joins bodies. list and g hold the largest neighbourhood. */
+static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t *list, double *g) {
+    for (size_t a = 0; a < plan->n; a++) {
+        double A[9];
+        const size_t count = tlsphi_neighbours_of(plan, a, list, g);
+        tlsph_result r = tlsphi_moment(plan, a, list, g, count, A);
+        if (r) return r;
+        const double V = tlsphi_plan_volume(plan, a);
+        if (plan->correction) {
+            r = tlsphi_correct(plan, a, A, count, plan->correction + (size_t)(plan->dim * plan->dim) * a);
+            if (r) return r;
+        } else {
+            double worst = 0;
+            for (int k = 0; k < plan->dim * plan->dim; k++) {
+                const int i = k / plan->dim, j = k % plan->dim;
+                worst = tlsphi_dmax(worst, fabs(A[3 * i + j] - (i == j ? V : 0)));
+            }
+            if (!(worst <= (TLSPHI_EPSILON > 1e-10 ? 1e-3 : 1e-6) * V))
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "defect of sum C (x) d / 2 = V I over V", a, worst / V, 1e-6,
+                                        "pair vectors that are exact for linear fields");
+        }
+        for (size_t i = 0; i < count; i++) tlsphi_join(parent, (uint32_t)a, list[i]);
+    }
+    return TLSPH_OK;
+}
+
+static size_t tlsphi_count_pairs(tlsphi_plan *plan) {
+    plan->least = plan->n;
+    for (size_t a = 0; a < plan->n; a++) {
+        const size_t count = tlsphi_neighbours_of(plan, a, NULL, NULL);
+        plan->pairs += count;
+        plan->least = count < plan->least ? count : plan->least;
+        plan->most = count > plan->most ? count : plan->most;
+    }
+    return plan->most;
+}
+
+/* If M_a g_ab and M_b g_ab agree to round-off for every pair, C is antisymmetric and the solver needs no M_a. */
+static void tlsphi_test_antisymmetry(tlsphi_plan *plan, uint32_t *list, double *g) {
+    const int dim = plan->dim;
+    const size_t dd = (size_t)(dim * dim);
+    double worst = 0, largest = 0;
+    for (size_t a = 0; a < plan->n; a++) {
+        const size_t count = tlsphi_neighbours_of(plan, a, list, g);
+        for (size_t i = 0; i < count; i++)
+            for (int k = 0; k < dim; k++) {
+                double mine = 0, other = 0;
+                for (int l = 0; l < dim; l++) {
+                    mine += plan->correction[dd * a + (size_t)(k * dim + l)] * g[(size_t)dim * i + (size_t)l];
+                    other += plan->correction[dd * list[i] + (size_t)(k * dim + l)] * g[(size_t)dim * i + (size_t)l];
+                }
+                worst = tlsphi_dmax(worst, fabs(mine - other));
+                largest = tlsphi_dmax(largest, fabs(mine));
+            }
+    }
+    /* positions in float carry their own round-off; its effect on C is not asymmetry either */
+    plan->antisymmetric = worst <= (TLSPHI_EPSILON > 1e-10 ? 1e-5 : 1e-11) * largest;
+}
+
+/* Bodies get numbers in the order of their first particle; particles are ordered by body, then along the Morton curve
+   (kernels) or in the host's order. */
+static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
+    const size_t n = plan->n;
+    size_t *start = TLSPHI_SCRATCH(plan, size_t, n + 2);
+    uint32_t *label = TLSPHI_SCRATCH(plan, uint32_t, n);
+    plan->host = TLSPHI_SCRATCH(plan, uint32_t, n);
+    plan->inner = TLSPHI_SCRATCH(plan, uint32_t, n);
+    plan->body = TLSPHI_SCRATCH(plan, uint32_t, n);
+    if (!start || !label || !plan->host || !plan->inner || !plan->body) return tlsphi_no_memory(plan, 20.0 * (double)n);
+    for (size_t a = 0; a < n; a++) { /* roots are the smallest numbers of their bodies, so they come first */
+        const uint32_t root = tlsphi_root(parent, (uint32_t)a);
+        label[a] = root == a ? (uint32_t)plan->bodies++ : label[root];
+        start[label[a] + 2]++;
+    }
+    for (size_t b = 0; b < plan->bodies; b++) start[b + 2] += start[b + 1];
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t a = plan->grid.order ? plan->grid.order[i] : (uint32_t)i;
+        const size_t at = start[label[a] + 1]++;
+        plan->host[at] = a;
+        plan->inner[a] = (uint32_t)at;
+        plan->body[at] = label[a];
+    }
+    return TLSPH_OK;
+}
+
+/* ==== [MATERIALS] ==================================================================================================
+   Every law is a pair of potentials at the reference temperature: e_R and eta_R (000-19, 22). Then
+     theta = theta_R + (E - p.p/(2 rho) - e_R)/c_v   or   theta_R exp((eta - eta_R)/c_v)               (000-20, 23)
+     Sigma_X = d e_R/dX - theta d eta_R/dX   for X = F, H, J, at fixed entropy.
+   The built-in laws share one deviatoric energy
+     psi(F,H,J) = zeta (J^-2/3 F:F - 3) + gamma (J^-2 (H:H)^3/2 - 3 sqrt 3),   mu = 2 zeta + 3 sqrt 3 gamma,
+   and one volumetric energy u(J) = k/2 (J - 1)^2:
+     neo-Hookean, Mie-Grueneisen   e_R = psi + u + beta theta_R (J - 1)      eta_R = beta (J^q - 1)/q
+     modified entropic elasticity  e_R = beta theta_R (J - 1)                eta_R = (e_R - psi - u)/theta_R
+     linear                        psi = mu dev(eps):dev(eps), H = I, J = 1 + tr eps; the rest as Mie-Grueneisen with q = 1
+   with beta = c_v Gamma_0 = 3 kappa alpha and k = kappa - beta theta_R (1 - q) (Mie-Grueneisen) or kappa (000-29, 32).
+
+   THE J EQUATION (default, TLSPH_SPLIT). If J is evolved, psi sees F and det F only, u and the thermal terms see J, and
+   the drift phi = J - det F costs W(phi) = b0 mu (phi^2/2 + phi^4/(4 phi_c^2)). W cancels in P, because
+   dW/dF + dW/dJ H = 0 when H = cof F, and stays in Sigma_J = e_J - theta eta_J + W'. Without W, Sigma_J(I) != 0 lets a
+   drift lower the energy and the printed form becomes unstable. */
+
+/* A material's constants as the loops want them. */
+typedef struct tlsphi_material {
+    tlsph_material_kind kind;
+    int entropic;                            /* MEE: psi and u sit in the entropy */
+    tlsph_real rho, c_v, theta_R, h;         /* kg/m^3, J/(m^3 K), K, W/(m K) */
+    tlsph_real zeta, gamma, k, beta, q;      /* Pa, Pa, Pa, Pa/K, 1 */
+    tlsph_real mu, kappa;                    /* Pa */
+    tlsph_response_fn response;
+    void *user;
+} tlsphi_material;
+
+static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
+    tlsphi_material out;
+    memset(&out, 0, sizeof out);
+    out.kind = m->kind;
+    out.entropic = m->kind == TLSPH_MEE;
+    out.rho = m->density;
+    out.c_v = m->density * m->specific_heat;
+    out.theta_R = m->reference_temperature;
+    out.h = m->conductivity;
+    out.mu = m->young / (2 * (1 + m->poisson));
+    out.kappa = m->young / (3 * (1 - 2 * m->poisson));
+    out.q = m->kind == TLSPH_MIE_GRUNEISEN ? m->gruneisen_exponent : 1;
+    out.beta = m->kind == TLSPH_NEO_HOOKEAN || m->kind == TLSPH_USER ? 0 : 3 * out.kappa * m->expansion;
+    out.gamma = m->mooney_fraction * out.mu / TLSPHI_R(5.196152422706632); /* 3 sqrt 3 */
+    out.zeta = (1 - m->mooney_fraction) * out.mu / 2;
+    out.k = out.kappa - out.beta * out.theta_R * (1 - out.q);
+    out.response = m->response;
+    out.user = m->response_user;
+    return out;
+}
+
+/* The deviatoric energy and its derivatives: Sigma_F = a F, Sigma_H = b H, dpsi/dJ = c. */
+typedef struct tlsphi_deviator { tlsph_real psi, a, b, c; } tlsphi_deviator;
+
+TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_real I1, tlsph_real I2, tlsph_real J) {
+    tlsphi_deviator out;
+    const tlsph_real root = tlsphi_cbrt(J), J23 = 1 / (root * root);
+    out.psi = m->zeta * (J23 * I1 - 3);
+    out.a = 2 * m->zeta * J23;
+    out.b = 0;
+    out.c = -out.a * I1 / (3 * J);
+    if (m->gamma != 0) {
+        const tlsph_real root2 = tlsphi_sqrt(I2), J2 = 1 / (J * J);
+        out.psi += m->gamma * (J2 * I2 * root2 - TLSPHI_R(5.196152422706632));
+        out.b = 3 * m->gamma * J2 * root2;
+        out.c -= 2 * m->gamma * J2 * I2 * root2 / J;
+    }
+    return out;
+}
+
+/* Upper bound of the largest eigenvalue of the acoustic tensor of psi + u over all directions, Pa.
+   For a direction N put f = F N, h = H N (then f.h = J) and r = H H^T h. The acoustic tensor is
+     2 zeta J^-2/3 [I - 2/(3J) (f h + h f) + 5 I1/(9J^2) h h] + k h h
+     + 3 gamma J^-2 sqrt(I2) S + 3 gamma J^-4/sqrt(I2) [(I2 h + r)(I2 h + r) - 2 I2^2 h h],   S = the form |F x (m (x) N)|^2.
+   In the basis (h/|h|, across) each entry is bounded by the largest and smallest principal stretches, which follow from
+   the invariants; the 2x2 eigenvalue is then a bound. It is exact at F = I, where dropping the mixed terms would give
+   kappa + 8/3 mu instead of kappa + 4/3 mu. */
+typedef struct tlsphi_spread_of { tlsph_real I1, I2, J, L1, LH, l3; } tlsphi_spread_of; /* largest of F^T F, of H^T H; least of F^T F */
+
+TLSPHI_INLINE tlsphi_spread_of tlsphi_principal_bounds(tlsph_real I1, tlsph_real I2, tlsph_real J) {
+    tlsphi_spread_of s;
+    s.I1 = I1; s.I2 = I2; s.J = J;
+    s.L1 = tlsphi_largest_bound(I1, I1 * I1 - 2 * I2);           /* tr C^2 = I1^2 - 2 I2 */
+    s.LH = tlsphi_largest_bound(I2, I2 * I2 - 2 * J * J * I1);   /* the same for cof C */
+    s.l3 = J * J / s.LH;
+    return s;
+}
+static tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_spread_of *s) {
+    const tlsph_real ratio = tlsphi_sqrt(s->L1 * s->LH) / s->J; /* largest over least stretch */
+    tlsph_real along = dev->a * (5 * s->I1 * s->LH / (9 * s->J * s->J) - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
+    tlsph_real across = dev->a, mixed = dev->a * (ratio - 1 / ratio) / 3;
+    if (m->gamma != 0) {
+        const tlsph_real factor = dev->b / (s->J * s->J * s->I2); /* 3 gamma J^-4 / sqrt I2 */
+        const tlsph_real least = s->J * s->J / s->L1;             /* of H^T H */
+        const tlsph_real half = (s->LH - least) / 2, sum = s->I2 + s->LH;
+        const tlsph_real bracket = sum * sum - 2 * s->I2 * s->I2;
+        along += dev->b * (s->I1 - s->l3) + factor * bracket * (bracket > 0 ? s->LH : least);
+        across += dev->b * s->L1 + factor * half * half * s->LH;
+        mixed += dev->b * (s->L1 - s->l3) / 2 + factor * s->LH * sum * half;
+    }
+    return (along + across + tlsphi_sqrt((along - across) * (along - across) + 4 * mixed * mixed)) / 2;
+}
+/* MEE: bound of |d eta_R/dF N|^2, by which coupling stiffens the isentropic wave. With the vectors above,
+   d eta_R/dF N = (beta theta_R h - P_psi N)/theta_R = c_h h + c_f f + c_r r. */
+static tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_spread_of *s) {
+    const tlsph_real mooney = dev->b * s->I2 / s->J; /* 3 gamma J^-3 I2^3/2 */
+    const tlsph_real volumetric = m->k * (s->J - 1) - dev->a * s->I1 / (3 * s->J) + mooney / 3;
+    const tlsph_real c_h = m->beta - volumetric / m->theta_R, c_f = -dev->a / m->theta_R;
+    const tlsph_real c_r = mooney / (s->I2 * m->theta_R), least = s->J * s->J / s->L1;
+    tlsph_real largest = 0;
+    for (int end = 0; end < 2; end++) {
+        const tlsph_real c = c_h + c_r * (end ? s->LH : least);
+        largest = tlsphi_max(largest, c * c * s->LH + 2 * c * c_f * s->J + c_f * c_f * s->L1);
+    }
+    const tlsph_real norm = tlsphi_sqrt(largest) + c_r * tlsphi_sqrt(s->LH) * (s->LH - least) / 2;
+    return norm * norm;
+}
+
+/* Bounds rho c^2 = [0] + theta [1]. J here is det F; with `coupled` = 0 the isothermal p speed. */
+static void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_spread_of *s, int coupled,
+                          tlsph_response *out) {
+    const tlsph_real elastic = tlsphi_acoustic_bound(m, dev, s);
+    const tlsph_real shear = dev->a + dev->b * s->I1 / 3;
+    if (m->entropic) {
+        out->p_modulus[0] = out->s_modulus[0] = 0;
+        out->p_modulus[1] = elastic / m->theta_R;
+        if (coupled) out->p_modulus[1] += tlsphi_entropic_coupling(m, dev, s) / m->c_v;
+        out->s_modulus[1] = shear / m->theta_R;
+        return;
+    }
+    const tlsph_real power = m->q == 1 ? 1 : tlsphi_pow(s->J, m->q - 1), gruneisen = m->beta * power; /* -deta_R/dJ sign dropped */
+    tlsph_real thermal = m->beta * (1 - m->q) * power / s->J;
+    if (coupled && m->beta != 0) thermal += gruneisen * gruneisen / m->c_v;
+    out->p_modulus[0] = elastic;
+    out->p_modulus[1] = thermal * s->LH;
+    out->s_modulus[0] = shear;
+    out->s_modulus[1] = 0;
+}
+
+/* Linear material: psi = mu dev(eps):dev(eps). */
+static void tlsphi_respond_linear(const tlsphi_material *m, const tlsph_real *F, tlsph_real J, int coupled, tlsph_response *out,
+                                  tlsphi_deviator *dev) {
+    const tlsph_real third = (F[0] + F[4] + F[8]) / 3 - 1;
+    tlsph_real square = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const tlsph_real e = (F[3 * i + j] + F[3 * j + i]) / 2 - (i == j ? 1 + third : 0);
+            out->e_F[3 * i + j] = 2 * m->mu * e;
+            square += e * e;
+        }
+    memset(out->eta_F, 0, sizeof out->eta_F);
+    memset(dev, 0, sizeof *dev);
+    dev->psi = m->mu * square;
+    out->energy = dev->psi + m->k / 2 * (J - 1) * (J - 1) + m->beta * m->theta_R * (J - 1);
+    out->entropy = m->beta * (J - 1);
+    out->e_J = m->k * (J - 1) + m->beta * m->theta_R;
+    out->eta_J = m->beta;
+    out->p_modulus[0] = m->kappa + TLSPHI_R(4.0 / 3.0) * m->mu;
+    out->p_modulus[1] = coupled && m->beta != 0 ? m->beta * m->beta / m->c_v : 0;
+    out->s_modulus[0] = m->mu;
+    out->s_modulus[1] = 0;
+}
+
+/* The built-in laws at F with deviatoric arguments (H, Jd) and volumetric argument J. e_F holds the whole deviatoric
+   part a F + b H x F + c H (for MEE it is -theta_R eta_F). `dev` returns a, b, c for conjugates. */
+static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H, tlsph_real Jd, tlsph_real J,
+                           int coupled, tlsph_response *out, tlsphi_deviator *dev) {
+    if (m->kind == TLSPH_LINEAR) { tlsphi_respond_linear(m, F, J, coupled, out, dev); return; }
+    const tlsph_real I1 = tlsphi_dot(9, F, F), I2 = tlsphi_dot(9, H, H);
+    tlsph_real S[9];
+    *dev = tlsphi_deviatoric(m, I1, I2, Jd);
+    for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
+    if (m->gamma != 0) {
+        tlsph_real HxF[9];
+        tlsph_cross(H, F, HxF);
+        for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
+    }
+    const tlsph_real u = m->k / 2 * (J - 1) * (J - 1), du = m->k * (J - 1), thermal = m->beta * m->theta_R;
+    if (m->entropic) {
+        out->energy = thermal * (J - 1);
+        out->entropy = (out->energy - dev->psi - u) / m->theta_R;
+        for (int i = 0; i < 9; i++) { out->e_F[i] = 0; out->eta_F[i] = -S[i] / m->theta_R; }
+        out->e_J = thermal;
+        out->eta_J = m->beta - du / m->theta_R;
+    } else {
+        const tlsph_real power = m->q == 1 ? J : m->q == 0 ? 1 : tlsphi_pow(J, m->q);
+        out->energy = dev->psi + u + thermal * (J - 1);
+        out->entropy = m->q == 0 ? (m->beta == 0 ? 0 : m->beta * tlsphi_log(J)) : m->beta * (power - 1) / m->q;
+        for (int i = 0; i < 9; i++) { out->e_F[i] = S[i]; out->eta_F[i] = 0; }
+        out->e_J = du + thermal;
+        out->eta_J = m->beta * power / J;
+    }
+    const tlsphi_spread_of spread = tlsphi_principal_bounds(I1, I2, Jd);
+    tlsphi_moduli(m, dev, &spread, coupled, out);
+}
+
+/* W(phi)/(b0 mu), W' and W'' of the drift potential. */
+TLSPHI_INLINE void tlsphi_drift(tlsph_real phi, tlsph_real scale, tlsph_real *W, tlsph_real *dW, tlsph_real *ddW) {
+    const tlsph_real s2 = phi * phi / (scale * scale);
+    *W = phi * phi * (TLSPHI_R(0.5) + TLSPHI_R(0.25) * s2);
+    *dW = phi * (1 + s2);
+    *ddW = 1 + 3 * s2;
+}
+
+/* The first constant out of range, or NULL. */
+static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, double *value, const char **allowed) {
+    const struct { const char *name; tlsph_real value; double low, high; int open_low, open_high; const char *allowed; } range[] = {
+        {"density", m->density, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
+        {"young", m->young, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
+        {"poisson", m->poisson, -1, 0.5, 1, 1, "between -1 and 0.5, both excluded"},
+        {"expansion", m->expansion, 0, TLSPHI_LARGEST, 0, 1, "0 or more"},
+        {"conductivity", m->conductivity, 0, TLSPHI_LARGEST, 0, 1, "0 or more"},
+        {"reference_temperature", m->reference_temperature, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
+        {"gruneisen_exponent", m->gruneisen_exponent, 0, 1, 0, 0, "0 to 1"},
+        {"mooney_fraction", m->mooney_fraction, 0, 1, 0, 0, "0 to 1"},
+        {"specific_heat", m->specific_heat, 0, TLSPHI_LARGEST, thermal, 1, "more than 0 in thermal scenes, else 0 or more"},
+    };
+    for (size_t i = 0; i < sizeof range / sizeof range[0]; i++) {
+        const double v = (double)range[i].value;
+        const int ok = tlsphi_finite(range[i].value) && (range[i].open_low ? v > range[i].low : v >= range[i].low) &&
+                       (range[i].open_high ? v < range[i].high : v <= range[i].high);
+        if (ok) continue;
+        *value = v;
+        *allowed = range[i].allowed;
+        return range[i].name;
+    }
+    *value = (double)m->kind;
+    *allowed = "a tlsph_material_kind; TLSPH_USER with a response function";
+    if ((unsigned)m->kind > (unsigned)TLSPH_USER || (m->kind == TLSPH_USER && !m->response)) return "kind";
+    const tlsphi_material c = tlsphi_calibrate(m);
+    *value = (double)c.k;
+    *allowed = "more than 0: kappa - 3 kappa alpha theta_R (1 - q); lower alpha or raise q";
+    return c.k > 0 ? NULL : "chi_R";
+}
+
+TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, const tlsph_real *F, tlsph_real theta,
+                                                tlsph_material_state *out) {
+    double value;
+    const char *allowed;
+    if (!material || !F || !out) return TLSPH_ERROR_ARGUMENT;
+    if (tlsphi_material_fault(material, 0, &value, &allowed)) return TLSPH_ERROR_MATERIAL;
+    if (!tlsphi_all_finite(F, 9) || !tlsphi_finite(theta)) return TLSPH_ERROR_NOT_FINITE;
+    if (!(theta > 0)) return TLSPH_ERROR_TEMPERATURE;
+    const tlsphi_material m = tlsphi_calibrate(material);
+    const int linear = m.kind == TLSPH_LINEAR, coupled = m.c_v > 0;
+    tlsph_real H[9], d = tlsph_determinant(F), weight = 1;
+    tlsph_response r;
+    tlsphi_deviator dev;
+    memset(&dev, 0, sizeof dev);
+    if (linear) { tlsphi_identity(H); d = F[0] + F[4] + F[8] - 2; } else tlsph_cofactor(F, H);
+    if (!(d > 0) && !linear) return TLSPH_ERROR_INVERSION;
+    if (m.kind == TLSPH_USER) {
+        const uint32_t particle = 0;
+        m.response(m.user, 1, &particle, F, &d, &r);
+    } else {
+        tlsphi_respond(&m, F, H, d, d, coupled, &r, &dev);
+    }
+    if (m.entropic) weight = theta / m.theta_R;
+    const tlsph_real p = r.e_J - theta * r.eta_J;
+    for (int i = 0; i < 9; i++) {
+        const tlsph_real S = r.e_F[i] - theta * r.eta_F[i];
+        out->P[i] = S + p * H[i];
+        out->Sigma_F[i] = m.kind == TLSPH_USER || linear ? S : weight * dev.a * F[i];
+        out->Sigma_H[i] = weight * dev.b * H[i];
+    }
+    out->Sigma_J = p + weight * dev.c;
+    out->theta = theta;
+    out->eta = r.entropy + (coupled ? m.c_v * tlsphi_log(theta / m.theta_R) : 0);
+    out->internal_energy = r.energy + m.c_v * (theta - m.theta_R);
+    out->helmholtz = out->internal_energy - theta * out->eta;
+    out->c_p = tlsphi_sqrt(tlsphi_max(r.p_modulus[0] + theta * r.p_modulus[1], 0) / m.rho);
+    out->c_s = tlsphi_sqrt(tlsphi_max(r.s_modulus[0] + theta * r.s_modulus[1], 0) / m.rho);
+    return TLSPH_OK;
+}
+
+/* ==== [SOLVER DATA] ================================================================================================
+   All arrays are in the solver's order and lie in one block. D = dimension, DD = D * D. Optional arrays are NULL where the
+   scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
+   so their value does not depend on the threads. */
+
+#define TLSPHI_BLOCK 128 /* particles a task: small enough for load balance, large enough to hide the call */
+#define TLSPHI_CHUNK 32  /* particles a call of a user's material */
+
+typedef struct tlsphi_state {
+    tlsph_real *x, *p, *F; /* D, D, DD */
+    tlsph_real *H, *J, *E; /* DD, 1, 1 (E or eta); optional */
+} tlsphi_state;
+
+enum { TLSPHI_SUM_DISSIPATION, TLSPHI_SUM_DISSIPATION_ENTROPY, TLSPHI_SUM_CONDUCTION_ENTROPY, TLSPHI_SUM_LEAST, TLSPHI_SUMS };
+enum { TLSPHI_MOMENTS = 16 }; /* sums of the projection, see [PROJECTION] */
+
+typedef struct tlsphi_block {
+    uint32_t begin, end, body;
+    uint32_t failed;                   /* first bad particle of the block, or TLSPHI_NONE */
+    tlsph_result failure;
+    double time_step;                  /* stable step of its particles, s */
+    double sums[TLSPHI_SUMS];
+    double moments[TLSPHI_MOMENTS];
+} tlsphi_block;
+
+typedef struct tlsphi_mirror { uint32_t particle; int tangent, conducts; tlsph_real N[3]; } tlsphi_mirror;
+typedef struct tlsphi_fix { uint32_t particle; tlsph_real e[3]; } tlsphi_fix;
+
+typedef struct tlsphi_load {
+    tlsph_condition given;    /* pointers replaced by copies */
+    uint32_t *inner, *host;   /* solver and host numbers */
+    tlsph_real *area;         /* traction, heat flux: 1; pressure: D; else NULL */
+    tlsph_real *values;       /* 3 or 1 a particle, of the current stage */
+    tlsph_real *X, *x;        /* 3 a particle, for the callback; NULL without */
+    tlsph_real *before;       /* driven velocity: kinetic part before the stage, 1 a particle */
+} tlsphi_load;
+
+/* Cumulative entries of the ledger, and the values from which they count. */
+typedef struct tlsphi_account {
+    double dissipation, dissipation_entropy, conduction_entropy, external_work, external_heat, external_entropy;
+    double projection_work, contact_loss, impulse[3], angular_impulse[3], least_pair_production;
+    double initial_energy, initial_entropy, initial_momentum[3], initial_angular[3];
+} tlsphi_account;
+
+typedef struct tlsphi_body {
+    uint32_t first;                          /* particle */
+    double volume, inertia[9], centre[3];    /* of the stage's positions */
+    double v_mean[3], spin[3];               /* rigid motion nearest to v */
+    double lambda[3], linear[3];             /* multipliers of the projection */
+} tlsphi_body;
+
+struct tlsph_solver {
+    int dim, thermal, has_H, has_J, corrected, mirrored, conducts, has_user, audit, projection, dissipation_heats, threads;
+    tlsph_dissipation dissipation;
+    tlsph_volume_coupling coupling;
+    tlsph_conduction conduction;
+    tlsph_real drift_stiffness, drift_scale, jump_share, drift_relaxation, cfl;
+    size_t n, pairs, blocks, bodies, fixes, mirrors, loads;
+    tlsphi_material *materials; size_t material_count;
+    uint8_t *material_of;                          /* NULL: one material */
+    /* operator */
+    size_t *first; uint32_t *neighbour; tlsph_real *g, *M;
+    tlsph_real *X, *V, *B, *tau;
+    uint32_t *host, *inner;
+    /* state, and the state at the beginning of the step */
+    tlsphi_state now, old; tlsph_real *now_memory, *old_memory; size_t state_reals;
+    /* rates per reference volume; rate_F is grad v */
+    tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
+    /* what neighbours read: velocity, P M, A = H M, (c_p, c_s, rho, drift ratio), Sigma_J and its gradient,
+       temperature and its gradient, M^T Q/theta, h/J; w is v without the body's rigid motion, as the dissipation sees it
+       (without projection w and grad_w are v and rate_F) */
+    tlsph_real *w, *grad_w, *v, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
+    /* conditions */
+    tlsphi_fix *fix; tlsphi_mirror *mirror; uint32_t *mirror_of; tlsphi_load *load;
+    tlsphi_block *block; tlsphi_body *body;
+    /* time and balances */
+    double time; uint64_t step; double last_dt, first_dt; uint64_t fingerprint;
+    tlsphi_account account, account_old;
+    tlsph_error error;
+    tlsph_size size;
+    /* threads and memory */
+    tlsph_run_fn run; void *run_user;
+    tlsph_allocator allocator; void *memory; size_t memory_size; int owns_memory;
+};
+
+TLSPHI_INLINE const tlsphi_material *tlsphi_material_of(const tlsph_solver *s, size_t a) {
+    return s->materials + (s->material_of ? s->material_of[a] : 0);
+}
+
+/* Runs task(arg, i) for every block i: on the host's threads, with OpenMP, or serially. */
+static void tlsphi_run_tasks(const tlsph_solver *s, tlsph_task_fn task, void *arg) {
+    const long count = (long)s->blocks;
+    if (s->run) { s->run(s->run_user, task, arg, s->blocks); return; }
+#ifdef _OPENMP
+    if (s->threads > 0) {
+#pragma omp parallel for schedule(static) num_threads(s->threads)
+        for (long i = 0; i < count; i++) task(arg, (size_t)i);
+        return;
+    }
+#pragma omp parallel for schedule(static)
+#endif
+    for (long i = 0; i < count; i++) task(arg, (size_t)i);
+}
+
+/* The same for a function of a block. */
+typedef void (*tlsphi_block_fn)(tlsph_solver *s, tlsphi_block *block);
+typedef struct tlsphi_phase { tlsph_solver *s; tlsphi_block_fn fn; } tlsphi_phase;
+
+static void tlsphi_phase_task(void *arg, size_t i) {
+    const tlsphi_phase *phase = (const tlsphi_phase *)arg;
+    phase->fn(phase->s, phase->s->block + i);
+}
+static void tlsphi_run(tlsph_solver *s, tlsphi_block_fn fn) {
+    tlsphi_phase phase;
+    phase.s = s;
+    phase.fn = fn;
+    tlsphi_run_tasks(s, tlsphi_phase_task, &phase);
+}
+
+static void tlsphi_cross3(const double a[3], const double b[3], double out[3]) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/* -- the state of one particle, evaluated: Algorithm 1 lines (8), (9) -- */
+
+typedef struct tlsphi_point {
+    tlsph_real F[9], H[9], d, J;  /* d = det F (linear: 1 + tr eps) */
+    tlsph_response r;             /* with W inside */
+    tlsphi_deviator dev;
+    tlsph_real kinetic, theta, p, P[9], Sigma_J, c_p, c_s, drift_ratio;
+} tlsphi_point;
+
+/* Loads F, H and J as 3x3; where H or J are not evolved they follow from F. */
+static void tlsphi_load_measures(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a, tlsphi_point *pt) {
+    const int dim = s->dim;
+    const size_t dd = (size_t)(dim * dim);
+    tlsphi_expand(dim, u->F + dd * a, 1, pt->F);
+    if (m->kind == TLSPH_LINEAR) {
+        tlsphi_identity(pt->H);
+        pt->d = pt->F[0] + pt->F[4] + pt->F[8] - 2;
+    } else {
+        pt->d = tlsph_determinant(pt->F);
+        if (s->has_H) tlsphi_expand(dim, u->H + dd * a, pt->F[0] * pt->F[4] - pt->F[1] * pt->F[3], pt->H);
+        else tlsph_cofactor(pt->F, pt->H);
+    }
+    pt->J = s->has_J ? u->J[a] : pt->d;
+}
+
+/* Adds W(J - d) to the energy (MEE: to the entropy), returns W' and W''/kappa. */
+static tlsph_real tlsphi_add_drift(const tlsph_solver *s, const tlsphi_material *m, tlsphi_point *pt) {
+    const tlsph_real stiffness = s->drift_stiffness * m->mu;
+    tlsph_real W, dW, ddW;
+    tlsphi_drift(pt->J - pt->d, s->drift_scale, &W, &dW, &ddW);
+    if (m->entropic) pt->r.entropy -= stiffness * W / m->theta_R;
+    else pt->r.energy += stiffness * W;
+    pt->drift_ratio = stiffness * ddW / m->kappa;
+    return stiffness * dW;
+}
+
+static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a, const tlsphi_point *pt) {
+    if (s->thermal == TLSPH_ENERGY) return m->theta_R + (u->E[a] - pt->kinetic - pt->r.energy) / m->c_v;
+    if (s->thermal == TLSPH_ENTROPY) return m->theta_R * tlsphi_exp((u->E[a] - pt->r.entropy) / m->c_v);
+    return m->theta_R;
+}
+
+/* Sets F, H, J, response: all that does not need the temperature. `user`: response of a user's material, if evaluated
+   already. Returns TLSPH_OK, NOT_FINITE or INVERSION. */
+static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state *u, size_t a, const tlsph_response *user, tlsphi_point *pt) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    const int dim = s->dim, joint = s->coupling == TLSPH_JOINT_AS_PRINTED;
+    tlsphi_load_measures(s, u, m, a, pt);
+    if (!tlsphi_finite(pt->d) || !tlsphi_finite(pt->J)) return TLSPH_ERROR_NOT_FINITE;
+    if (m->kind != TLSPH_LINEAR && (!(pt->d > 0) || !(pt->J > 0))) return TLSPH_ERROR_INVERSION;
+    if (m->kind == TLSPH_USER) {
+        if (user) pt->r = *user;
+        else m->response(m->user, 1, s->host + a, pt->F, &pt->J, &pt->r);
+        memset(&pt->dev, 0, sizeof pt->dev);
+    } else if (s->has_H && !joint && m->gamma != 0) {
+        tlsph_real H[9]; /* the deviatoric part sees the true cofactor */
+        tlsph_cofactor(pt->F, H);
+        tlsphi_respond(m, pt->F, H, pt->d, pt->J, s->thermal, &pt->r, &pt->dev);
+    } else {
+        tlsphi_respond(m, pt->F, pt->H, joint ? pt->J : pt->d, pt->J, s->thermal, &pt->r, &pt->dev);
+    }
+    pt->kinetic = tlsphi_dot(dim, u->p + (size_t)dim * a, u->p + (size_t)dim * a) / (2 * m->rho);
+    pt->drift_ratio = 0;
+    pt->Sigma_J = s->has_J && !joint ? tlsphi_add_drift(s, m, pt) : pt->dev.c;
+    return TLSPH_OK;
+}
+
+/* Everything at a particle. */
+static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state *u, size_t a, const tlsph_response *user, tlsphi_point *pt) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    const tlsph_result result = tlsphi_respond_at(s, u, a, user, pt);
+    if (result) return result;
+    const tlsph_real theta = pt->theta = tlsphi_temperature(s, u, m, a, pt);
+    if (!tlsphi_finite(theta)) return TLSPH_ERROR_NOT_FINITE;
+    if (!(theta > 0)) return TLSPH_ERROR_TEMPERATURE;
+    pt->p = pt->r.e_J - theta * pt->r.eta_J;
+    for (int i = 0; i < 9; i++) pt->P[i] = pt->r.e_F[i] - theta * pt->r.eta_F[i] + pt->p * pt->H[i];
+    pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta / m->theta_R : 1);
+    pt->c_p = tlsphi_sqrt(tlsphi_max(pt->r.p_modulus[0] + theta * pt->r.p_modulus[1], 0) / m->rho);
+    pt->c_s = tlsphi_sqrt(tlsphi_max(pt->r.s_modulus[0] + theta * pt->r.s_modulus[1], 0) / m->rho);
+    return tlsphi_all_finite(pt->P, 9) && tlsphi_finite(pt->kinetic) && tlsphi_finite(pt->c_p) ? TLSPH_OK : TLSPH_ERROR_NOT_FINITE;
+}
+
+/* One callback for the run of particles [begin, end) that share a user's material. */
+static void tlsphi_user_responses(const tlsph_solver *s, size_t begin, size_t end, tlsph_response *out) {
+    tlsph_real F[9 * TLSPHI_CHUNK], J[TLSPHI_CHUNK];
+    for (size_t start = begin, stop; start < end; start = stop) {
+        const tlsphi_material *m = tlsphi_material_of(s, start);
+        for (stop = start; stop < end && tlsphi_material_of(s, stop) == m; stop++) {
+            tlsphi_point pt;
+            tlsphi_load_measures(s, &s->now, m, stop, &pt);
+            memcpy(F + 9 * (stop - start), pt.F, sizeof pt.F);
+            J[stop - start] = pt.J;
+        }
+        if (m->kind == TLSPH_USER) m->response(m->user, stop - start, s->host + start, F, J, out + (start - begin));
+    }
+}
+
+/* Mirror rules (METHOD: boundary-aware gradients). At a roller with normal N tangential velocities, temperature and
+   Sigma_J are even across the plane, so their normal derivative vanishes: G -= (I - N N) (G N) (x) N. At a tangentially
+   fixed face the normal velocity is even: G -= N N (G N) (x) N. Both are orthogonal projections; used on P as well they
+   keep force and gradient adjoint, so that no energy is lost. */
+static void tlsphi_mirror_tensor(int dim, const tlsphi_mirror *mirror, tlsph_real *G) {
+    tlsph_real GN[3];
+    tlsphi_multiply(dim, G, mirror->N, GN);
+    const tlsph_real normal = tlsphi_dot(dim, GN, mirror->N);
+    for (int i = 0; i < dim; i++) GN[i] = mirror->tangent ? -normal * mirror->N[i] : normal * mirror->N[i] - GN[i];
+    tlsphi_add_outer(dim, G, GN, mirror->N);
+}
+static void tlsphi_mirror_vector(int dim, const tlsphi_mirror *mirror, tlsph_real *grad) {
+    const tlsph_real normal = tlsphi_dot(dim, grad, mirror->N);
+    for (int i = 0; i < dim; i++) grad[i] -= normal * mirror->N[i];
+}
+/* The mirrors of particle a are consecutive; the list ends with a sentinel. */
+static const tlsphi_mirror *tlsphi_mirrors_of(const tlsph_solver *s, size_t a) {
+    return s->mirror_of && s->mirror_of[a] != TLSPHI_NONE ? s->mirror + s->mirror_of[a] : NULL;
+}
+
+/* Largest stable step of one particle, s: (78) with the current isentropic speed, and the diffusive limit. */
+static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi_point *pt) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    const double tau = (double)s->tau[a];
+    double dt = TLSPHI_LARGEST;
+    if (pt->c_p > 0) dt = (double)s->cfl * tau / (double)pt->c_p;
+    if (s->conducts && m->h > 0) {
+        tlsph_real HtH[9];
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) HtH[3 * i + j] = pt->H[i] * pt->H[j] + pt->H[3 + i] * pt->H[3 + j] + pt->H[6 + i] * pt->H[6 + j];
+        const tlsph_real K = m->h / pt->J * tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
+        dt = tlsphi_dmin(dt, 0.8 * (double)m->c_v * tau * tau / (2 * s->dim * (double)K));
+    }
+    return dt;
+}
+
+/* Writes what neighbours read. */
+static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    tlsph_real P[9], H[9];
+    tlsphi_shrink(dim, pt->P, P);
+    tlsphi_shrink(dim, pt->H, H);
+    for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++) tlsphi_mirror_tensor(dim, mirror, P);
+    if (s->M) {
+        tlsphi_product(dim, P, s->M + dd * a, s->PM + dd * a);
+        tlsphi_product(dim, H, s->M + dd * a, s->A + dd * a);
+    } else {
+        memcpy(s->PM + dd * a, P, dd * sizeof *P);
+        memcpy(s->A + dd * a, H, dd * sizeof *H);
+    }
+    for (size_t i = 0; i < D; i++) s->v[D * a + i] = s->now.p[D * a + i] / m->rho;
+    s->wave[4 * a] = pt->c_p;
+    s->wave[4 * a + 1] = pt->c_s;
+    s->wave[4 * a + 2] = m->rho;
+    s->wave[4 * a + 3] = pt->drift_ratio;
+    if (s->S) s->S[a] = pt->Sigma_J;
+    if (s->theta) s->theta[a] = pt->theta;
+    if (s->h_J) s->h_J[a] = m->h / pt->J;
+}
+
+static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
+    tlsph_response user[TLSPHI_CHUNK];
+    tlsphi_point pt;
+    block->failed = TLSPHI_NONE;
+    block->time_step = TLSPHI_LARGEST;
+    for (size_t begin = block->begin; begin < block->end; begin += TLSPHI_CHUNK) {
+        const size_t end = begin + TLSPHI_CHUNK < block->end ? begin + TLSPHI_CHUNK : block->end;
+        if (s->has_user) tlsphi_user_responses(s, begin, end, user);
+        for (size_t a = begin; a < end; a++) {
+            const tlsph_result result = tlsphi_constitute(s, &s->now, a, user + (a - begin), &pt);
+            if (result) {
+                block->failed = (uint32_t)a;
+                block->failure = result;
+                return;
+            }
+            tlsphi_publish(s, a, &pt);
+            block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, a, &pt));
+        }
+    }
+}
+/* Evaluates all particles; returns the first failed block or NULL. */
+static const tlsphi_block *tlsphi_evaluate(tlsph_solver *s) {
+    tlsphi_run(s, tlsphi_evaluate_block);
+    for (size_t i = 0; i < s->blocks; i++)
+        if (s->block[i].failed != TLSPHI_NONE) return s->block + i;
+    return NULL;
+}
+
+/* ==== [DISSIPATION] ================================================================================================
+   The jump of v between two particles is damped along n = c/|c| with the p speed and across with the s speed (000-73, 74).
+   Raw jumps are first order. Reconstruction takes the linear part away: with d = X_b - X_a,
+     Dr = Dv - (grad v_a + grad v_b)/2 d,
+   which is third order in smooth flow. Then D_p . Dv >= 0 no longer holds by itself; the limiter drops the normal or the
+   tangential part where it would be negative. Energy goes with it without division by temperature differences:
+     D_E = (v_a + v_b)/2 . D_p + (Sigma_a + Sigma_b)/2 D_J,
+   so that each side receives half of the production Dv . D_p + DS D_J >= 0 as heat. The printed form (66), (76) uses
+   jumps of v theta_R/theta: a translating body with uneven temperature is pushed, and D_E is singular.
+
+   Rigid rotation. In a bent body that turns, Dr is not zero: the dissipation would brake the turn, the projection would
+   push it on again, and the heat in between would come from nowhere. So v stands here for the velocity w that remains
+   when the rigid motion of the body is taken away (see [PROJECTION]). A turning frame then changes nothing. */
+
+/* S_p (jump): half_impedance = rho |C| / 2. */
+TLSPHI_INLINE void tlsphi_damp_velocity(int dim, int kind, const tlsph_real *Dv, const tlsph_real *Dr, const tlsph_real *n,
+                                        tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real *D_p) {
+    const tlsph_real *jump = kind == TLSPH_FIRST_ORDER || kind == TLSPH_AS_PRINTED ? Dv : Dr;
+    tlsph_real normal = tlsphi_dot(dim, n, jump), tangent[3];
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) tangent[i] = jump[i] - normal * n[i];
+    tlsph_real keep = 1;
+    if (kind == TLSPH_LIMITED) {
+        const tlsph_real raw = tlsphi_dot(dim, n, Dv);
+        /* tangent is perpendicular to n, so its product with Dv is that with the tangential part of Dv */
+        keep = tlsphi_dot(dim, tangent, Dv) > 0 ? TLSPHI_R(1) : TLSPHI_R(0);
+        normal = normal * raw > 0 ? normal : 0;
+    }
+    const tlsph_real across = keep * half_impedance * c_s, along = half_impedance * c_p * normal;
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) D_p[i] = across * tangent[i] + along * n[i];
+}
+/* The jump of a scalar that is damped; Dr: with its linear part taken away. */
+TLSPHI_INLINE tlsph_real tlsphi_damped_jump(int kind, tlsph_real D, tlsph_real Dr) {
+    if (kind == TLSPH_LIMITED) return D * Dr > 0 ? Dr : 0;
+    return kind == TLSPH_RECONSTRUCTED ? Dr : D;
+}
+/* S_J (000-73) times the share a_J, weakened where the drift potential is stiff; cc = |c|^2, CC = |C|. */
+TLSPHI_INLINE tlsph_real tlsphi_jacobian_factor(tlsph_real a_J, tlsph_real cc, tlsph_real CC, tlsph_real rho, tlsph_real c_p, tlsph_real mean_ratio) {
+    return a_J * cc / (2 * rho * c_p * CC * (1 + mean_ratio));
+}
+
+/* (66) and (76), with x/(x^2 + 1e-12) for 1/x where the temperatures meet. */
+static void tlsphi_dissipation_as_printed(const tlsph_pair_side *a, const tlsph_pair_side *b, const tlsph_real n[3],
+                                          tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real S_J, tlsph_pair_flux *out) {
+    const tlsph_real Xa = a->theta / a->theta_R, Xb = b->theta / b->theta_R, x = 1 / Xa - 1 / Xb;
+    tlsph_real jump[3], Dv[3], D_v[3];
+    for (int i = 0; i < 3; i++) {
+        Dv[i] = b->velocity[i] - a->velocity[i];
+        jump[i] = b->velocity[i] / Xb - a->velocity[i] / Xa;
+    }
+    const tlsph_real DS = b->Sigma_J - a->Sigma_J, jump_S = b->Sigma_J / Xb - a->Sigma_J / Xa;
+    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, jump, jump, n, half_impedance, c_p, c_s, out->D_p);
+    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, Dv, Dv, n, half_impedance, c_p, c_s, D_v);
+    out->D_J = S_J * jump_S;
+    const tlsph_real wanted = tlsphi_dot(3, Dv, D_v) + S_J * DS * DS;
+    const tlsph_real bracket = wanted - tlsphi_dot(3, jump, out->D_p) - S_J * jump_S * jump_S;
+    out->D_E = bracket * x / (x * x + TLSPHI_R(1e-12));
+    out->production = wanted;
+}
+
+TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_side *a, const tlsph_pair_side *b,
+                                       const tlsph_real C[3], const tlsph_real c[3], const tlsph_real d[3], tlsph_real a_J,
+                                       tlsph_pair_flux *out) {
+    const tlsph_real cc = tlsphi_dot(3, c, c), CC = tlsphi_sqrt(tlsphi_dot(3, C, C)), length = tlsphi_sqrt(cc);
+    const tlsph_real rho = (a->density + b->density) / 2, c_p = (a->c_p + b->c_p) / 2, c_s = (a->c_s + b->c_s) / 2;
+    tlsph_real n[3], Dv[3], Dr[3];
+    memset(out, 0, sizeof *out);
+    if (kind == TLSPH_NO_DISSIPATION || !(CC > 0) || !(length > 0)) return;
+    const tlsph_real S_J = tlsphi_jacobian_factor(a_J, cc, CC, rho, c_p, (a->drift_ratio + b->drift_ratio) / 2);
+    for (int i = 0; i < 3; i++) {
+        n[i] = c[i] / length;
+        Dv[i] = b->velocity[i] - a->velocity[i];
+        Dr[i] = Dv[i] - (tlsphi_dot(3, a->velocity_gradient + 3 * i, d) + tlsphi_dot(3, b->velocity_gradient + 3 * i, d)) / 2;
+    }
+    if (kind == TLSPH_AS_PRINTED) {
+        tlsphi_dissipation_as_printed(a, b, n, rho * CC / 2, c_p, c_s, S_J, out);
+        return;
+    }
+    const tlsph_real DS = b->Sigma_J - a->Sigma_J;
+    const tlsph_real DSr = DS - (tlsphi_dot(3, a->Sigma_J_gradient, d) + tlsphi_dot(3, b->Sigma_J_gradient, d)) / 2;
+    tlsphi_damp_velocity(3, (int)kind, Dv, Dr, n, rho * CC / 2, c_p, c_s, out->D_p);
+    out->D_J = S_J * tlsphi_damped_jump((int)kind, DS, DSr);
+    for (int i = 0; i < 3; i++) out->D_E += (a->velocity[i] + b->velocity[i]) / 2 * out->D_p[i];
+    out->D_E += (a->Sigma_J + b->Sigma_J) / 2 * out->D_J;
+    out->production = tlsphi_dot(3, Dv, out->D_p) + DS * out->D_J;
+}
+
+/* ==== [GRADIENTS] ==================================================================================================
+   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) g_ab M_a^T (000-53), for v and, where needed, Sigma_J and theta. */
+
+/* Corrects and stores a raw sum: out = G M^T. */
+TLSPHI_INLINE void tlsphi_store_gradient(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *G, tlsph_real *out) {
+    if (s->M) tlsphi_product_transposed(dim, G, s->M + (size_t)(dim * dim) * a, out);
+    else memcpy(out, G, (size_t)(dim * dim) * sizeof *G);
+}
+TLSPHI_INLINE void tlsphi_store_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad, tlsph_real *out) {
+    if (s->M) tlsphi_multiply(dim, s->M + (size_t)(dim * dim) * a, grad, out);
+    else memcpy(out, grad, (size_t)dim * sizeof *grad);
+}
+TLSPHI_INLINE void tlsphi_gradient_particle(const tlsph_solver *s, size_t a, const int dim, const int with_w, const int with_S, const int with_theta) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real *v_a = s->v + D * a, *w_a = s->w + D * a, half = 1 / (2 * s->V[a]);
+    tlsph_real G[9] = {0}, Gw[9] = {0}, gS[3] = {0}, gT[3] = {0};
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        const tlsph_real *v_b = s->v + D * b, *w_b = s->w + D * b;
+        tlsph_real g[3], Dv[3];
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = s->g[D * k + (size_t)i] * half;
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dv[i] = v_b[i] - v_a[i];
+        tlsphi_add_outer(dim, G, Dv, g);
+        if (with_w) {
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dv[i] = w_b[i] - w_a[i];
+            tlsphi_add_outer(dim, Gw, Dv, g);
+        }
+        if (with_S) TLSPHI_UNROLL for (int i = 0; i < dim; i++) gS[i] += (s->S[b] - s->S[a]) * g[i];
+        if (with_theta) TLSPHI_UNROLL for (int i = 0; i < dim; i++) gT[i] += (s->theta[b] - s->theta[a]) * g[i];
+    }
+    /* E without its kinetic part changes by P : grad w (see [PROJECTION]); PM : (raw sum) is exactly the adjoint of T_a */
+    if (s->rate_E) s->rate_E[a] = tlsphi_dot(dim * dim, s->PM + dd * a, with_w ? Gw : G);
+    tlsphi_store_gradient(s, a, dim, G, s->rate_F + dd * a);
+    if (with_w) tlsphi_store_gradient(s, a, dim, Gw, s->grad_w + dd * a);
+    if (with_S) tlsphi_store_slope(s, a, dim, gS, s->grad_S + D * a);
+    if (with_theta) tlsphi_store_slope(s, a, dim, gT, s->grad_theta + D * a);
+}
+
+static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
+    const size_t D = (size_t)s->dim;
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
+        tlsphi_mirror_tensor(s->dim, m, s->rate_F + D * D * a);
+        if (s->projection) tlsphi_mirror_tensor(s->dim, m, s->grad_w + D * D * a);
+        if (s->grad_S && !m->tangent) tlsphi_mirror_vector(s->dim, m, s->grad_S + D * a);
+        if (s->grad_theta && !m->tangent && !m->conducts) tlsphi_mirror_vector(s->dim, m, s->grad_theta + D * a);
+    }
+}
+
+/* M^T Q / theta with Q = -h/J H^T H grad theta (000-56). Q is mirrored like the gradient, so that both stay adjoint. */
+static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim;
+    tlsphi_point pt;
+    tlsph_real H[9], push[3], Q[3];
+    tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
+    tlsphi_shrink(dim, pt.H, H);
+    tlsphi_multiply(dim, H, s->grad_theta + D * a, push);
+    tlsphi_multiply_transposed(dim, H, push, Q);
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
+        if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, Q);
+    const tlsph_real factor = -s->h_J[a] / s->theta[a];
+    for (int i = 0; i < dim; i++) Q[i] *= factor;
+    if (s->M) tlsphi_multiply_transposed(dim, s->M + D * D * a, Q, s->heat + D * a);
+    else memcpy(s->heat + D * a, Q, D * sizeof *Q);
+}
+
+/* dJ/dt = H : grad v; the dissipation is added by the fluxes. */
+static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
+    const size_t D = (size_t)s->dim;
+    tlsphi_point pt;
+    tlsph_real H[9];
+    tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
+    tlsphi_shrink(s->dim, pt.H, H);
+    s->rate_J[a] = tlsphi_dot(s->dim * s->dim, H, s->rate_F + D * D * a);
+}
+
+/* One instance for each combination that a scene may have: the pair loop itself has no branch. */
+TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, const int dim, int with_w, int with_S, int with_theta) {
+    switch ((with_w ? 4 : 0) + (with_S ? 2 : 0) + (with_theta ? 1 : 0)) {
+    case 0: tlsphi_gradient_particle(s, a, dim, 0, 0, 0); break;
+    case 1: tlsphi_gradient_particle(s, a, dim, 0, 0, 1); break;
+    case 2: tlsphi_gradient_particle(s, a, dim, 0, 1, 0); break;
+    case 3: tlsphi_gradient_particle(s, a, dim, 0, 1, 1); break;
+    case 4: tlsphi_gradient_particle(s, a, dim, 1, 0, 0); break;
+    case 5: tlsphi_gradient_particle(s, a, dim, 1, 0, 1); break;
+    case 6: tlsphi_gradient_particle(s, a, dim, 1, 1, 0); break;
+    default: tlsphi_gradient_particle(s, a, dim, 1, 1, 1); break;
+    }
+}
+static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
+    const int with_S = s->grad_S != NULL, with_theta = s->grad_theta != NULL;
+    for (size_t a = block->begin; a < block->end; a++) {
+        if (s->dim == 3) tlsphi_gradient_dispatch(s, a, 3, s->projection, with_S, with_theta);
+        else tlsphi_gradient_dispatch(s, a, 2, s->projection, with_S, with_theta);
+        if (s->mirrors) tlsphi_mirror_gradients(s, a);
+        if (s->rate_J) tlsphi_jacobian_rate(s, a);
+        if (with_theta) tlsphi_heat_flux(s, a);
+    }
+}
+
+/* ==== [FLUXES] =====================================================================================================
+   One gather over the neighbours: stress, numerical dissipation and heat. The power of the stresses needs no pairs: the
+   flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total is
+   conserved to round-off because force and gradient are adjoint. The dimension, J, the thermal unknown
+   and `plain` (default dissipation, antisymmetric C, no audit) are constants of each instance below, so that the pair
+   loop has no branch that could be decided beforehand. */
+
+/* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
+typedef struct tlsphi_gathered { tlsph_real T[3], J, heat, production, conduction, source; double least; } tlsphi_gathered;
+
+/* Fluxes of the default forms for one pair. dim, with_J, thermal are constants after inlining. */
+TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C, const tlsph_real *c,
+                                         const int dim, const int with_J, const int thermal, const int kind, tlsphi_gathered *sum,
+                                         tlsph_real *production) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real *w_a = s->wave + 4 * a, *w_b = s->wave + 4 * b, *v_a = s->w + D * a, *v_b = s->w + D * b;
+    const tlsph_real *G_a = s->grad_w + dd * a, *G_b = s->grad_w + dd * b;
+    const tlsph_real cc = tlsphi_dot(dim, c, c), CC = tlsphi_sqrt(tlsphi_dot(dim, C, C)), inverse = 1 / tlsphi_sqrt(cc);
+    const tlsph_real rho = (w_a[2] + w_b[2]) / 2, c_p = (w_a[0] + w_b[0]) / 2, c_s = (w_a[1] + w_b[1]) / 2;
+    tlsph_real n[3], d[3], Dv[3], Dr[3], D_p[3], D_J = 0, DS = 0;
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
+        n[i] = c[i] * inverse;
+        d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
+        Dv[i] = v_b[i] - v_a[i];
+    }
+    tlsphi_multiply_mean(dim, G_a, G_b, d, Dr);
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dr[i] = Dv[i] - Dr[i];
+    tlsphi_damp_velocity(dim, kind, Dv, Dr, n, rho * CC / 2, c_p, c_s, D_p);
+    if (with_J) {
+        DS = s->S[b] - s->S[a];
+        const tlsph_real slope = (tlsphi_dot(dim, s->grad_S + D * a, d) + tlsphi_dot(dim, s->grad_S + D * b, d)) / 2;
+        D_J = tlsphi_jacobian_factor(s->jump_share, cc, CC, rho, c_p, (w_a[3] + w_b[3]) / 2) * tlsphi_damped_jump(kind, DS, DS - slope);
+        sum->J += D_J;
+    }
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += D_p[i];
+    *production = tlsphi_dot(dim, Dv, D_p) + DS * D_J;
+    if (thermal == TLSPH_ENERGY) sum->heat += *production / 2 + (with_J ? s->S[a] * D_J : 0); /* D_E - v_a.D_p */
+}
+
+/* The printed form in the same place; slow and seldom used, so it goes through the public function. */
+static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C, const tlsph_real *c,
+                                tlsphi_gathered *sum, tlsph_real *production) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim, index[2] = {a, b};
+    tlsph_pair_side side[2];
+    tlsph_pair_flux flux;
+    tlsph_real C3[3] = {0}, c3[3] = {0}, d[3] = {0};
+    memset(side, 0, sizeof side);
+    for (int i = 0; i < 2; i++) {
+        const size_t q = index[i];
+        side[i].theta_R = tlsphi_material_of(s, q)->theta_R;
+        side[i].theta = s->thermal == TLSPH_ENERGY ? s->theta[q] : side[i].theta_R; /* eta form and isothermal: (72) */
+        side[i].c_p = s->wave[4 * q];
+        side[i].c_s = s->wave[4 * q + 1];
+        side[i].density = s->wave[4 * q + 2];
+        side[i].drift_ratio = s->wave[4 * q + 3];
+        if (s->S) side[i].Sigma_J = s->S[q];
+        for (int k = 0; k < dim; k++) side[i].velocity[k] = s->w[D * q + (size_t)k];
+    }
+    for (int k = 0; k < dim; k++) { C3[k] = C[k]; c3[k] = c[k]; }
+    tlsph_pair_dissipation(s->thermal == TLSPH_ENERGY ? TLSPH_AS_PRINTED : TLSPH_FIRST_ORDER, &side[0], &side[1], C3, c3, d,
+                           s->S ? s->jump_share : 0, &flux);
+    for (int k = 0; k < dim; k++) sum->T[k] += flux.D_p[k];
+    sum->J += flux.D_J;
+    if (s->thermal == TLSPH_ENERGY) sum->heat += flux.D_E - tlsphi_dot(3, side[0].velocity, flux.D_p);
+    *production = flux.production;
+}
+
+/* Heat of one pair. The double-gradient flux of (54e), (57), whose production is Q.grad theta/theta^2 exactly, and in the
+   compact form the difference between the two-point flux k (theta_b - theta_a) and its value from the gradients. On an
+   undeformed lattice the sum is the two-point flux, under shear the mixed terms of K stay; the limiter is that of the
+   dissipation, so heat of this part only flows down the pair's temperature difference. k = h/J |c|^2 / (C.d). */
+TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g, const tlsph_real *C,
+                                    const int dim, const int thermal, tlsphi_gathered *sum) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real q_a = tlsphi_dot(dim, s->heat + D * a, g), q_b = tlsphi_dot(dim, s->heat + D * b, g);
+    const tlsph_real theta_a = s->theta[a], theta_b = s->theta[b];
+    sum->source -= q_a * (theta_b - theta_a);
+    if (thermal == TLSPH_ENERGY) sum->heat -= (q_a * theta_b + q_b * theta_a) / 2;
+    else sum->heat -= (q_a + q_b) / 2;
+    if (s->conduction != TLSPH_COMPACT) return;
+    tlsph_real d[3], c_a[3], c_b[3];
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
+    const tlsph_real Cd = tlsphi_dot(dim, C, d), D_theta = theta_b - theta_a;
+    const tlsph_real slope = (tlsphi_dot(dim, s->grad_theta + D * a, d) + tlsphi_dot(dim, s->grad_theta + D * b, d)) / 2;
+    const tlsph_real jump = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope);
+    if (!(Cd > 0)) return;
+    tlsphi_multiply(dim, s->A + dd * a, g, c_a);
+    tlsphi_multiply(dim, s->A + dd * b, g, c_b);
+    const tlsph_real k = (s->h_J[a] * tlsphi_dot(dim, c_a, c_a) + s->h_J[b] * tlsphi_dot(dim, c_b, c_b)) / (2 * Cd);
+    const tlsph_real into = k * jump;
+    sum->heat += thermal == TLSPH_ENERGY ? into : into / theta_a;
+    sum->conduction += into * D_theta / (2 * theta_a * theta_b);
+}
+
+/* Audit: the pair's production over the size of its terms must not be negative beyond round-off. */
+static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsphi_gathered *before, const tlsphi_gathered *after, tlsph_real production) {
+    const size_t D = (size_t)s->dim;
+    double size = s->S ? fabs((double)(s->S[b] - s->S[a]) * (double)(after->J - before->J)) : 0;
+    for (size_t i = 0; i < D; i++)
+        size += fabs((double)(s->w[D * b + i] - s->w[D * a + i]) * (double)(after->T[i] - before->T[i]));
+    return size > 0 ? (double)production / size : 0;
+}
+
+TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int dim, const int with_J, const int thermal,
+                                     const int plain, tlsphi_gathered *sum) {
+    const size_t D = (size_t)dim, dd = D * D;
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        const tlsph_real *g = s->g + D * k, *C = g;
+        tlsph_real t[3], c[3], skew[3], production = 0;
+        if (!plain && s->M) {
+            tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
+            C = skew;
+        }
+        tlsphi_multiply_mean(dim, s->PM + dd * a, s->PM + dd * b, g, t); /* (P_a C_ab - P_b C_ba)/2 */
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+        if (plain) {
+            tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
+            tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, TLSPH_LIMITED, sum, &production);
+        } else if (s->dissipation != TLSPH_NO_DISSIPATION) {
+            const tlsphi_gathered before = *sum;
+            tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
+            if (s->dissipation == TLSPH_AS_PRINTED) tlsphi_pair_printed(s, a, b, C, c, sum, &production);
+            else tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, (int)s->dissipation, sum, &production);
+            if (s->audit) sum->least = tlsphi_dmin(sum->least, tlsphi_audit(s, a, b, &before, sum, production));
+        }
+        sum->production += production;
+        if (thermal && s->conducts) tlsphi_pair_heat(s, a, b, g, C, dim, thermal, sum);
+    }
+}
+
+/* Relaxation of J towards det F, -r c_p/D phi with r growing near incompressibility's other end (METHOD: J equation). */
+static tlsph_real tlsphi_relaxation(const tlsph_solver *s, size_t a) {
+    tlsphi_point pt;
+    tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
+    const tlsph_real ratio = s->wave[4 * a + 1] / s->wave[4 * a], strain = tlsphi_log(pt.J / pt.d) / TLSPHI_R(0.05);
+    const tlsph_real r = tlsphi_min(1, s->drift_relaxation * ratio * ratio * (1 + strain * strain));
+    return -r * s->wave[4 * a] / s->tau[a] * (pt.J - pt.d);
+}
+
+/* Turns the gathered sums of one particle into rates per volume and block sums. */
+static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *sum, double *block) {
+    const size_t D = (size_t)s->dim;
+    const tlsph_real inverse = 1 / s->V[a];
+    tlsph_real relaxation = 0;
+    for (size_t i = 0; i < D; i++) s->rate_p[D * a + i] = sum->T[i] * inverse;
+    if (s->rate_J && s->drift_relaxation > 0) relaxation = tlsphi_relaxation(s, a);
+    if (s->rate_J) s->rate_J[a] += sum->J * inverse + relaxation;
+    block[TLSPHI_SUM_DISSIPATION] += (double)sum->production / 2;
+    block[TLSPHI_SUM_LEAST] = tlsphi_dmin(block[TLSPHI_SUM_LEAST], sum->least);
+    if (!s->rate_E) return;
+    const tlsph_real theta = s->theta[a];
+    tlsph_real rate = sum->heat * inverse;
+    block[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)(sum->production / (2 * theta));
+    block[TLSPHI_SUM_CONDUCTION_ENTROPY] += (double)sum->conduction;
+    if (s->conducts) { /* -Q.grad theta/theta^2, the source of (57) */
+        const tlsph_real source = sum->source / (2 * theta);
+        block[TLSPHI_SUM_CONDUCTION_ENTROPY] += (double)source;
+        if (s->thermal == TLSPH_ENTROPY) rate += source * inverse;
+    }
+    if (s->thermal == TLSPH_ENTROPY && s->dissipation_heats) rate += sum->production * inverse / (2 * theta);
+    if (s->thermal == TLSPH_ENTROPY && s->drift_relaxation > 0 && s->rate_J) rate -= relaxation * s->S[a] / theta;
+    s->rate_E[a] = s->thermal == TLSPH_ENERGY ? s->rate_E[a] + rate : rate;
+}
+
+TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const int dim, const int with_J, const int thermal, const int plain) {
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_gathered sum;
+        memset(&sum, 0, sizeof sum);
+        sum.least = TLSPHI_LARGEST;
+        tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, &sum);
+        tlsphi_flux_store(s, a, &sum, block->sums);
+    }
+}
+#define TLSPHI_FLUX(name, dim, with_J, thermal, plain) \
+    static void name(tlsph_solver *s, tlsphi_block *b) { tlsphi_flux_range(s, b, dim, with_J, thermal, plain); }
+#define TLSPHI_FLUXES(dim, plain)                                                                                        \
+    TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_0_0, dim, 0, 0, plain) TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_0_1, dim, 0, 1, plain) \
+    TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_0_2, dim, 0, 2, plain) TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_1_0, dim, 1, 0, plain) \
+    TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_1_1, dim, 1, 1, plain) TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_1_2, dim, 1, 2, plain)
+TLSPHI_FLUXES(2, 0)
+TLSPHI_FLUXES(2, 1)
+TLSPHI_FLUXES(3, 0)
+TLSPHI_FLUXES(3, 1)
+#define TLSPHI_FLUX_ROW(dim, plain)                                                                        \
+    {{tlsphi_flux_##dim##_p##plain##_0_0, tlsphi_flux_##dim##_p##plain##_0_1, tlsphi_flux_##dim##_p##plain##_0_2}, \
+     {tlsphi_flux_##dim##_p##plain##_1_0, tlsphi_flux_##dim##_p##plain##_1_1, tlsphi_flux_##dim##_p##plain##_1_2}}
+
+static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
+    static const tlsphi_block_fn instances[2][2][2][3] = {
+        {TLSPHI_FLUX_ROW(2, 0), TLSPHI_FLUX_ROW(2, 1)},
+        {TLSPHI_FLUX_ROW(3, 0), TLSPHI_FLUX_ROW(3, 1)},
+    };
+    const int plain = s->dissipation == TLSPH_LIMITED && !s->M && !s->audit;
+    for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
+    instances[s->dim == 3][plain][s->has_J][s->thermal](s, block);
+}
+
+/* ==== [CONDITIONS] =================================================================================================
+   Loads are forces and heat added to the rates. Constraints act on the momentum after each stage: first driven
+   velocities, then fixed directions, then walls, then prescribed temperatures. Fixed directions of a particle are
+   orthonormal, so that applying them one after the other satisfies all of them, whatever the angles of the planes.
+
+   Energy of driven particles. E holds the kinetic energy, and the drive replaces the momentum that the fluxes would have
+   given. So the power of all forces on the driven component leaves the rate of E, and after the stage the true change of
+   its kinetic energy is added; what E gains is the work of the drive. */
+
+static int tlsphi_condition_components(tlsph_condition_kind kind) {
+    switch (kind) {
+    case TLSPH_VELOCITY: case TLSPH_FORCE: case TLSPH_TRACTION: case TLSPH_BODY_FORCE: case TLSPH_ACCELERATION: return 3;
+    case TLSPH_PRESSURE: case TLSPH_TEMPERATURE: case TLSPH_HEAT_FLUX: case TLSPH_HEAT_SOURCE: return 1;
+    default: return 0;
+    }
+}
+static int tlsphi_is_thermal(tlsph_condition_kind kind) {
+    return kind == TLSPH_TEMPERATURE || kind == TLSPH_HEAT_FLUX || kind == TLSPH_HEAT_SOURCE;
+}
+
+/* One stage of the Runge-Kutta scheme: u = a u_old + b (u + dt L(u)); its rates and its corrections after the stage enter
+   the result of the step with these weights. */
+typedef struct tlsphi_stage { double a, b, start, end, rate_weight, after_weight; int last; } tlsphi_stage;
+
+/* Values of a load for this time: constant, or from the host's callback. */
+static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) {
+    const size_t count = load->given.count, D = (size_t)s->dim;
+    const size_t components = (size_t)tlsphi_condition_components(load->given.kind);
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < components; k++) load->values[components * i + k] = load->given.value[k];
+    if (!load->given.values) return;
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            load->X[3 * i + k] = k < D ? s->X[D * load->inner[i] + k] : 0;
+            load->x[3 * i + k] = k < D ? s->now.x[D * load->inner[i] + k] : 0;
+        }
+    load->given.values(load->given.values_user, (tlsph_real)time, count, load->host, load->X, load->x, load->values);
+}
+
+/* Where forces of this stage act, so that the angular balance of the step closes (see [PROJECTION]). */
+static void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double X[3]) {
+    const size_t D = (size_t)s->dim;
+    X[2] = 0;
+    for (size_t i = 0; i < D; i++) {
+        const double x = (double)s->now.x[D * a + i];
+        X[i] = stage->last ? stage->a * (double)s->old.x[D * a + i] + stage->b * (x + dt * (double)s->v[D * a + i]) : x;
+    }
+}
+
+/* The force of a load on its i-th particle, N. */
+static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real force[3]) {
+    const size_t a = load->inner[i], D = (size_t)s->dim;
+    const tlsph_real *value = load->values + 3 * i;
+    tlsph_real factor = 1;
+    if (load->given.kind == TLSPH_PRESSURE) { /* -p H A: A is carried to the deformed normal (Nanson) */
+        tlsphi_point pt;
+        tlsph_real H[9];
+        tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
+        tlsphi_shrink(s->dim, pt.H, H);
+        tlsphi_multiply(s->dim, H, load->area + D * i, force);
+        for (size_t k = 0; k < D; k++) force[k] *= -load->values[i];
+        return;
+    }
+    if (load->given.kind == TLSPH_TRACTION) factor = load->area[i];
+    if (load->given.kind == TLSPH_BODY_FORCE) factor = s->V[a];
+    if (load->given.kind == TLSPH_ACCELERATION) factor = s->V[a] * tlsphi_material_of(s, a)->rho;
+    for (size_t k = 0; k < D; k++) force[k] = factor * value[k];
+}
+
+static void tlsphi_apply_force(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
+    const size_t D = (size_t)s->dim;
+    const double share = stage->rate_weight * dt;
+    tlsphi_account *account = &s->account;
+    for (size_t i = 0; i < load->given.count; i++) {
+        const size_t a = load->inner[i];
+        tlsph_real force[3] = {0, 0, 0};
+        double X[3];
+        tlsphi_load_force(s, load, i, force);
+        tlsphi_stage_position(s, stage, dt, a, X);
+        const tlsph_real power = tlsphi_dot(s->dim, force, s->v + D * a);
+        for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += force[k] / s->V[a];
+        account->external_work += share * (double)power;
+        for (int k = 0; k < 3; k++) {
+            const int l = (k + 1) % 3, m = (k + 2) % 3;
+            account->impulse[k] += share * (double)force[k];
+            account->angular_impulse[k] += share * (X[l] * (double)force[m] - X[m] * (double)force[l]);
+        }
+    }
+}
+
+static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
+    for (size_t i = 0; i < load->given.count; i++) {
+        const size_t a = load->inner[i];
+        const tlsph_real theta = s->theta[a];
+        const tlsph_real power = load->given.kind == TLSPH_HEAT_FLUX ? -load->values[i] * load->area[i] : load->values[i] * s->V[a];
+        s->rate_E[a] += power / s->V[a] / (s->thermal == TLSPH_ENTROPY ? theta : 1);
+        s->account.external_heat += stage->rate_weight * dt * (double)power;
+        s->account.external_entropy += stage->rate_weight * dt * (double)(power / theta);
+    }
+}
+
+/* Component of a vector that a drive prescribes: all of it, or that along the normal. */
+static void tlsphi_driven_part(int dim, const tlsph_condition *c, const tlsph_real *v, tlsph_real *part) {
+    const tlsph_real nn = tlsphi_dot(dim, c->normal, c->normal);
+    const tlsph_real along = nn > 0 ? tlsphi_dot(dim, v, c->normal) / nn : 0;
+    for (int i = 0; i < dim; i++) part[i] = nn > 0 ? along * c->normal[i] : v[i];
+}
+static void tlsphi_release_driven_power(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage *stage, double dt) {
+    const size_t D = (size_t)s->dim;
+    for (size_t i = 0; i < load->given.count; i++) {
+        const size_t a = load->inner[i];
+        tlsph_real part[3];
+        tlsphi_driven_part(s->dim, &load->given, s->v + D * a, part);
+        const tlsph_real power = tlsphi_dot(s->dim, part, s->rate_p + D * a);
+        load->before[i] = tlsphi_dot(s->dim, part, part) * tlsphi_material_of(s, a)->rho / 2;
+        if (s->thermal == TLSPH_ENERGY) s->rate_E[a] -= power;
+        s->account.external_work -= stage->rate_weight * dt * (double)(power * s->V[a]);
+    }
+}
+
+static void tlsphi_apply_loads(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    for (size_t i = 0; i < s->loads; i++) {
+        tlsphi_load *load = s->load + i;
+        const tlsph_condition_kind kind = load->given.kind;
+        if (kind == TLSPH_VELOCITY || kind == TLSPH_TEMPERATURE || kind == TLSPH_WALL) continue;
+        tlsphi_load_values(s, load, s->time + stage->start * dt);
+        if (tlsphi_is_thermal(kind)) tlsphi_apply_heat(s, load, stage, dt);
+        else tlsphi_apply_force(s, load, stage, dt);
+    }
+    for (size_t i = 0; i < s->loads; i++)
+        if (s->load[i].given.kind == TLSPH_VELOCITY) tlsphi_release_driven_power(s, s->load + i, stage, dt);
+}
+
+/* Sets driven momenta at the end of a stage and gives E the change of their kinetic energy. */
+static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage *stage, double time) {
+    const size_t D = (size_t)s->dim;
+    tlsphi_load_values(s, load, time);
+    for (size_t i = 0; i < load->given.count; i++) {
+        const size_t a = load->inner[i];
+        const tlsph_real rho = tlsphi_material_of(s, a)->rho;
+        tlsph_real is[3], was[3], wanted[3], *p = s->now.p + D * a;
+        tlsphi_driven_part(s->dim, &load->given, p, is);
+        tlsphi_driven_part(s->dim, &load->given, s->old.p + D * a, was);
+        tlsphi_driven_part(s->dim, &load->given, load->values + 3 * i, wanted);
+        for (size_t k = 0; k < D; k++) p[k] += rho * wanted[k] - is[k];
+        const double gain = (double)(rho * tlsphi_dot(s->dim, wanted, wanted) / 2) -
+                            stage->a * (double)(tlsphi_dot(s->dim, was, was) / (2 * rho)) - stage->b * (double)load->before[i];
+        if (s->thermal == TLSPH_ENERGY) s->now.E[a] += (tlsph_real)gain;
+        s->account.external_work += stage->after_weight * gain * (double)s->V[a];
+    }
+}
+
+static void tlsphi_apply_fixes(tlsph_solver *s) {
+    for (size_t i = 0; i < s->fixes; i++) {
+        tlsph_real *p = s->now.p + (size_t)s->dim * s->fix[i].particle;
+        const tlsph_real along = tlsphi_dot(s->dim, p, s->fix[i].e);
+        for (int k = 0; k < s->dim; k++) p[k] -= along * s->fix[i].e[k];
+    }
+}
+
+/* A particle at or behind the wall may not move further into it. The kinetic energy that stops stays in E as heat. */
+static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, double weight) {
+    const size_t D = (size_t)s->dim;
+    for (size_t i = 0; i < load->given.count; i++) {
+        const size_t a = load->inner[i];
+        tlsph_real gap[3], *p = s->now.p + D * a;
+        for (size_t k = 0; k < D; k++) gap[k] = s->now.x[D * a + k] - load->given.point[k];
+        const tlsph_real along = tlsphi_dot(s->dim, p, load->given.normal);
+        if (tlsphi_dot(s->dim, gap, load->given.normal) > 0 || along >= 0) continue;
+        for (size_t k = 0; k < D; k++) p[k] -= along * load->given.normal[k];
+        s->account.contact_loss += weight * (double)(along * along / (2 * tlsphi_material_of(s, a)->rho) * s->V[a]);
+    }
+}
+
+/* E or eta of particle a at temperature theta; everything else as it is. Returns 0 where the particle is not valid. */
+static int tlsphi_set_temperature(tlsph_solver *s, size_t a, tlsph_real theta) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    tlsphi_point pt;
+    if (tlsphi_respond_at(s, &s->now, a, NULL, &pt)) return 0;
+    if (s->thermal == TLSPH_ENERGY) s->now.E[a] = pt.kinetic + pt.r.energy + m->c_v * (theta - m->theta_R);
+    else s->now.E[a] = pt.r.entropy + m->c_v * tlsphi_log(theta / m->theta_R);
+    return 1;
+}
+static void tlsphi_hold_temperature(tlsph_solver *s, tlsphi_load *load, double weight, double time) {
+    tlsphi_load_values(s, load, time);
+    for (size_t i = 0; i < load->given.count; i++) {
+        const size_t a = load->inner[i];
+        const tlsph_real theta = load->values[i], before = s->now.E[a];
+        if (!tlsphi_set_temperature(s, a, theta)) continue; /* the evaluation that follows reports it */
+        const double gain = weight * (double)((s->now.E[a] - before) * s->V[a]);
+        s->account.external_heat += s->thermal == TLSPH_ENTROPY ? gain * (double)theta : gain;
+        s->account.external_entropy += s->thermal == TLSPH_ENTROPY ? gain : gain / (double)theta;
+    }
+}
+
+/* Algorithm 1 line (7). */
+static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    const double time = s->time + stage->end * dt;
+    for (size_t i = 0; i < s->loads; i++)
+        if (s->load[i].given.kind == TLSPH_VELOCITY) tlsphi_drive(s, s->load + i, stage, time);
+    tlsphi_apply_fixes(s);
+    for (size_t i = 0; i < s->loads; i++)
+        if (s->load[i].given.kind == TLSPH_WALL) tlsphi_apply_wall(s, s->load + i, stage->after_weight);
+    for (size_t i = 0; i < s->loads; i++)
+        if (s->load[i].given.kind == TLSPH_TEMPERATURE) tlsphi_hold_temperature(s, s->load + i, stage->after_weight, time);
+}
+
+/* ==== [PROJECTION] =================================================================================================
+   Internal forces of a body must have no resultant and no torque about the stage's positions (000-79): x^n in the first
+   stage, x^{n+1} in the last. With these the angular momentum of the two-stage scheme is exact. The smallest change is
+     T^ = T + V (lambda x X' + mu),  X' = X - centre,  I lambda = -sum X' x T,  mu = -sum T / sum V          (000-81, 82)
+   The stresses need none of it as long as F is the gradient of x and H = cof F; the torque comes from the dissipation.
+
+   Energy. Split v = rigid + w, where the rigid motion is the nearest one to v at the same positions. T^ does no work on
+   the rigid part by construction, and T^ - T, being rigid, does none on w. So the power of the dissipative forces is
+   sum w.D_p = -sum over pairs Dw.D_p, exactly what the dissipation, evaluated with w, gives to the particles as heat:
+   the energy is conserved and no entropy is destroyed. For the same reason the stresses heat by P : grad w; it differs from
+   P : dF/dt only because the last stage takes torques about x^{n+1}, by O(dt^2). Works with constraints, which take their part of T^ as reaction,
+   and body by body. */
+
+typedef struct tlsphi_projection { tlsph_solver *s; tlsphi_stage stage; double dt; } tlsphi_projection;
+
+/* Position of particle a at this stage, seen from the first particle of its body (for the sake of round-off). */
+static void tlsphi_projection_arm(const tlsphi_projection *p, uint32_t body, size_t a, double X[3]) {
+    double origin[3];
+    tlsphi_stage_position(p->s, &p->stage, p->dt, p->s->body[body].first, origin);
+    tlsphi_stage_position(p->s, &p->stage, p->dt, a, X);
+    for (int i = 0; i < 3; i++) X[i] -= origin[i];
+}
+static void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
+    out[2] = 0;
+    for (int i = 0; i < dim; i++) out[i] = (double)v[i];
+}
+
+/* Sums of V | V X | V X X (6) | V v | V X x v over a block. */
+static void tlsphi_rigid_task(void *arg, size_t i) {
+    const tlsphi_projection *p = (const tlsphi_projection *)arg;
+    const tlsph_solver *s = p->s;
+    tlsphi_block *block = p->s->block + i;
+    double *m = block->moments, X[3], v[3], Xv[3];
+    memset(block->moments, 0, sizeof block->moments);
+    for (size_t a = block->begin; a < block->end; a++) {
+        const double V = (double)s->V[a];
+        tlsphi_projection_arm(p, block->body, a, X);
+        tlsphi_vector3(s->v + (size_t)s->dim * a, s->dim, v);
+        tlsphi_cross3(X, v, Xv);
+        m[0] += V;
+        for (int k = 0; k < 3; k++) {
+            m[1 + k] += V * X[k];
+            m[4 + k] += V * X[k] * X[k];
+            m[7 + k] += V * X[(k + 1) % 3] * X[(k + 2) % 3];
+            m[10 + k] += V * v[k];
+            m[13 + k] += V * Xv[k];
+        }
+    }
+}
+/* Sums of T | X x T over a block. */
+static void tlsphi_torque_task(void *arg, size_t i) {
+    const tlsphi_projection *p = (const tlsphi_projection *)arg;
+    const tlsph_solver *s = p->s;
+    tlsphi_block *block = p->s->block + i;
+    double *m = block->moments, X[3], T[3], XT[3];
+    memset(block->moments, 0, sizeof block->moments);
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_projection_arm(p, block->body, a, X);
+        tlsphi_vector3(s->rate_p + (size_t)s->dim * a, s->dim, T);
+        tlsphi_cross3(X, T, XT);
+        for (int k = 0; k < 3; k++) {
+            m[k] += (double)s->V[a] * T[k];
+            m[3 + k] += (double)s->V[a] * XT[k];
+        }
+    }
+}
+/* Rigid motion of a body from its moments: centre, inertia (both with V as weight), mean velocity and spin. */
+static void tlsphi_rigid_motion(tlsphi_body *body, const double *m) {
+    const double V = body->volume = m[0];
+    double *const c = body->centre, *const I = body->inertia, moment[3];
+    for (int i = 0; i < 3; i++) {
+        c[i] = m[1 + i] / V;
+        body->v_mean[i] = m[10 + i] / V;
+    }
+    const double xx = m[4] - V * c[0] * c[0], yy = m[5] - V * c[1] * c[1], zz = m[6] - V * c[2] * c[2];
+    I[0] = yy + zz; I[4] = xx + zz; I[8] = xx + yy;
+    I[5] = I[7] = -(m[7] - V * c[1] * c[2]);
+    I[2] = I[6] = -(m[8] - V * c[2] * c[0]);
+    I[1] = I[3] = -(m[9] - V * c[0] * c[1]);
+    tlsphi_cross3(c, m + 10, moment);
+    for (int i = 0; i < 3; i++) moment[i] = m[13 + i] - moment[i];
+    tlsphi_solve_symmetric(I, moment, body->spin);
+}
+static void tlsphi_multipliers(tlsphi_body *body, const double *m) {
+    double torque[3];
+    tlsphi_cross3(body->centre, m, torque);
+    for (int i = 0; i < 3; i++) {
+        torque[i] -= m[3 + i];
+        body->linear[i] = -m[i] / body->volume;
+    }
+    tlsphi_solve_symmetric(body->inertia, torque, body->lambda);
+}
+/* w = v - rigid motion. */
+static void tlsphi_relative_task(void *arg, size_t i) {
+    const tlsphi_projection *p = (const tlsphi_projection *)arg;
+    tlsph_solver *s = p->s;
+    const tlsphi_block *block = s->block + i;
+    const tlsphi_body *body = s->body + block->body;
+    const size_t D = (size_t)s->dim;
+    double X[3], turn[3];
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_projection_arm(p, block->body, a, X);
+        for (int k = 0; k < 3; k++) X[k] -= body->centre[k];
+        tlsphi_cross3(body->spin, X, turn);
+        for (size_t k = 0; k < D; k++) s->w[D * a + k] = (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
+    }
+}
+static void tlsphi_correct_task(void *arg, size_t i) {
+    const tlsphi_projection *p = (const tlsphi_projection *)arg;
+    tlsph_solver *s = p->s;
+    const tlsphi_block *block = s->block + i;
+    const tlsphi_body *body = s->body + block->body;
+    const size_t D = (size_t)s->dim;
+    double X[3], turn[3];
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_projection_arm(p, block->body, a, X);
+        for (int k = 0; k < 3; k++) X[k] -= body->centre[k];
+        tlsphi_cross3(body->lambda, X, turn);
+        for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += (tlsph_real)(turn[k] + body->linear[k]);
+    }
+}
+/* Adds the blocks' moments body by body, in block order, and hands them to `solve`. */
+static void tlsphi_each_body(tlsph_solver *s, void (*solve)(tlsphi_body *body, const double *moments)) {
+    for (size_t i = 0; i < s->blocks;) {
+        const uint32_t body = s->block[i].body;
+        double moments[TLSPHI_MOMENTS] = {0};
+        for (; i < s->blocks && s->block[i].body == body; i++)
+            for (int k = 0; k < TLSPHI_MOMENTS; k++) moments[k] += s->block[i].moments[k];
+        solve(s->body + body, moments);
+    }
+}
+static void tlsphi_find_rigid_motion(tlsphi_projection *p) {
+    tlsphi_run_tasks(p->s, tlsphi_rigid_task, p);
+    tlsphi_each_body(p->s, tlsphi_rigid_motion);
+    tlsphi_run_tasks(p->s, tlsphi_relative_task, p);
+}
+/* Algorithm 1 line (5). */
+static void tlsphi_project(tlsphi_projection *p) {
+    tlsphi_run_tasks(p->s, tlsphi_torque_task, p);
+    tlsphi_each_body(p->s, tlsphi_multipliers);
+    for (size_t i = 0; i < p->s->bodies; i++) {
+        const tlsphi_body *b = p->s->body + i;
+        double spin_moment[3] = {0, 0, 0};
+        for (int j = 0; j < 9; j++) spin_moment[j / 3] += b->inertia[j] * b->spin[j % 3];
+        p->s->account.projection_work += p->stage.rate_weight * p->dt *
+                                         (tlsphi_dot3(b->lambda, spin_moment) + b->volume * tlsphi_dot3(b->linear, b->v_mean));
+    }
+    tlsphi_run_tasks(p->s, tlsphi_correct_task, p);
+}
+
+/* ==== [RHS] ========================================================================================================
+   Algorithm 1 line (4). The boundaries between the phases are also where a distributed host would exchange halos. */
+
+static void tlsphi_collect_sums(tlsph_solver *s, double share) {
+    for (size_t i = 0; i < s->blocks; i++) {
+        const double *sums = s->block[i].sums;
+        s->account.dissipation += share * sums[TLSPHI_SUM_DISSIPATION];
+        s->account.dissipation_entropy += share * sums[TLSPHI_SUM_DISSIPATION_ENTROPY];
+        s->account.conduction_entropy += share * sums[TLSPHI_SUM_CONDUCTION_ENTROPY];
+        s->account.least_pair_production = tlsphi_dmin(s->account.least_pair_production, sums[TLSPHI_SUM_LEAST]);
+    }
+}
+static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    tlsphi_projection projection;
+    projection.s = s;
+    projection.stage = *stage;
+    projection.dt = dt;
+    if (s->projection) tlsphi_find_rigid_motion(&projection);
+    tlsphi_run(s, tlsphi_gradient_block);
+    tlsphi_run(s, tlsphi_flux_block);
+    tlsphi_collect_sums(s, stage->rate_weight * dt);
+    if (s->projection) tlsphi_project(&projection);
+    tlsphi_apply_loads(s, stage, dt);
+}
+
+/* ==== [STEP] =======================================================================================================
+   Two-stage TVD Runge-Kutta (000-77), geometry in the same scheme. */
+
+/* dH/dt = F x grad v, before F itself changes. */
+static void tlsphi_update_cofactor(tlsph_solver *s, size_t a, tlsph_real A, tlsph_real B, tlsph_real dt) {
+    const int dim = s->dim;
+    const size_t dd = (size_t)(dim * dim);
+    tlsph_real F[9], G[9], rate[9], in_plane[9];
+    tlsphi_expand(dim, s->now.F + dd * a, 1, F);
+    tlsphi_expand(dim, s->rate_F + dd * a, 0, G);
+    tlsph_cross(F, G, rate);
+    tlsphi_shrink(dim, rate, in_plane);
+    for (size_t i = dd * a; i < dd * (a + 1); i++)
+        s->now.H[i] = A * s->old.H[i] + B * (s->now.H[i] + dt * in_plane[i - dd * a]);
+}
+/* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
+static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
+    const size_t D = (size_t)s->dim;
+    s->rate_E[a] += tlsphi_dot(s->dim, s->v + D * a, s->rate_p + D * a);
+}
+/* u = A old + B (u + dt rate) over the entries [begin, end). */
+static void tlsphi_combine(tlsph_real *u, const tlsph_real *old, const tlsph_real *rate, size_t begin, size_t end, tlsph_real A,
+                           tlsph_real B, tlsph_real dt) {
+    for (size_t i = begin; i < end; i++) u[i] = A * old[i] + B * (u[i] + dt * rate[i]);
+}
+typedef struct tlsphi_update { tlsph_solver *s; tlsph_real A, B, dt; } tlsphi_update;
+
+static void tlsphi_update_task(void *arg, size_t i) {
+    const tlsphi_update *up = (const tlsphi_update *)arg;
+    tlsph_solver *s = up->s;
+    const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
+    const tlsph_real A = up->A, B = up->B, dt = up->dt;
+    for (size_t a = begin; s->has_H && a < end; a++) tlsphi_update_cofactor(s, a, A, B, dt);
+    for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
+    tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, A, B, dt);
+    tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, A, B, dt);
+    tlsphi_combine(s->now.F, s->old.F, s->rate_F, dd * begin, dd * end, A, B, dt);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, A, B, dt);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, A, B, dt);
+}
+/* Algorithm 1 line (6). */
+static void tlsphi_evolve(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    tlsphi_update up;
+    up.s = s;
+    up.A = (tlsph_real)stage->a;
+    up.B = (tlsph_real)stage->b;
+    up.dt = (tlsph_real)dt;
+    tlsphi_run_tasks(s, tlsphi_update_task, &up);
+}
+
+static void tlsphi_principal_data(tlsph_solver *s, size_t a, const tlsphi_point *pt, tlsph_error *e) {
+    const size_t D = (size_t)s->dim;
+    for (size_t i = 0; i < D; i++) e->position[i] = (double)s->now.x[D * a + i];
+    if (tlsphi_all_finite(pt->F, 9)) tlsphi_stretches(pt->F, e->stretches);
+    e->temperature = (double)pt->theta;
+    e->neighbours = s->first[a + 1] - s->first[a];
+    e->time = s->time;
+    e->step = s->step;
+}
+/* Describes the particle at which the evaluation failed. */
+static tlsph_result tlsphi_describe_failure(tlsph_solver *s, const tlsphi_block *block, const char *stage) {
+    const size_t a = block->failed;
+    tlsphi_point pt;
+    memset(&pt, 0, sizeof pt);
+    tlsphi_constitute(s, &s->now, a, NULL, &pt);
+    const char *field = "state", *allowed = "finite";
+    double value = (double)pt.kinetic;
+    if (block->failure == TLSPH_ERROR_INVERSION) {
+        field = pt.d > 0 ? "J" : "det F";
+        value = (double)(pt.d > 0 ? pt.J : pt.d);
+        allowed = "more than 0; the load may be too fast for the resolution, or nu needs J evolved";
+    } else if (block->failure == TLSPH_ERROR_TEMPERATURE) {
+        field = "temperature";
+        value = (double)pt.theta;
+        allowed = "more than 0; check heat loads and the energy that was put in";
+    }
+    tlsphi_fail(&s->error, block->failure, stage, field, s->host[a], value, 0, allowed);
+    tlsphi_principal_data(s, a, &pt, &s->error);
+    return block->failure;
+}
+
+static void tlsphi_keep_state(tlsph_solver *s) {
+    memcpy(s->old_memory, s->now_memory, s->state_reals * sizeof *s->now_memory);
+    s->account_old = s->account;
+}
+static void tlsphi_restore_state(tlsph_solver *s) {
+    memcpy(s->now_memory, s->old_memory, s->state_reals * sizeof *s->now_memory);
+    s->account = s->account_old;
+    tlsphi_evaluate(s);
+}
+
+TLSPHI_DEF tlsph_real tlsph_stable_time_step(const tlsph_solver *s) {
+    double dt = TLSPHI_LARGEST;
+    for (size_t i = 0; i < s->blocks; i++) dt = tlsphi_dmin(dt, s->block[i].time_step);
+#ifdef TLSPH_REAL_FLOAT
+    dt = tlsphi_dmin(dt, 3e38);
+#endif
+    return (tlsph_real)dt;
+}
+
+/* Algorithm 1, from state n to n + 1. */
+static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
+    static const tlsphi_stage stages[2] = {{0, 1, 0, 1, 0.5, 0.5, 0}, {0.5, 0.5, 1, 1, 0.5, 1, 1}};
+    tlsphi_keep_state(s);                                /* (1) u_old, x_old                     */
+    for (int k = 0; k < 2; k++) {
+        tlsphi_right_hand_side(s, &stages[k], dt);       /* (4) rates, (5) projection            */
+        tlsphi_evolve(s, &stages[k], dt);                /* (6) u = a u_old + b (u + dt L)       */
+        tlsphi_impose(s, &stages[k], dt);                /* (7) constraints                      */
+        const tlsphi_block *bad = tlsphi_evaluate(s);    /* (8) stress, (9) temperature          */
+        if (bad) {
+            const tlsph_result result = tlsphi_describe_failure(s, bad, "step");
+            tlsphi_restore_state(s);
+            return result;
+        }
+    }
+    s->step++;
+    s->last_dt = dt;
+    return TLSPH_OK;
+}
+
+TLSPHI_DEF tlsph_result tlsph_step(tlsph_solver *s, tlsph_real dt_limit) {
+    const double stable = (double)tlsph_stable_time_step(s);                    /* (2), (3) */
+    const double dt = (double)dt_limit < stable ? (double)dt_limit : stable;
+    if (!(dt > 0) || !(dt < 1e290))
+        return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "dt", TLSPH_NO_PARTICLE, dt, 0, "more than 0, finite");
+    if (s->first_dt > 0 && stable < 1e-9 * s->first_dt)
+        return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "stable dt", TLSPH_NO_PARTICLE, stable, 1e-9 * s->first_dt,
+                           "more than 1e-9 of the first step; wave speeds have run away");
+    if (!(s->first_dt > 0)) s->first_dt = stable;
+    const tlsph_result result = tlsphi_step_by(s, dt);
+    if (!result) s->time += dt;
+    return result;
+}
+TLSPHI_DEF tlsph_result tlsph_advance(tlsph_solver *s, tlsph_real time) {
+    const double end = (double)time;
+    if (!tlsphi_finite(time))
+        return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "advance", "time", TLSPH_NO_PARTICLE, end, 0, "finite");
+    while (s->time < end) {
+        const double left = end - s->time, stable = (double)tlsph_stable_time_step(s);
+        /* two equal steps instead of a full one and a sliver */
+        const double dt = left <= stable ? left : left < 2 * stable ? left / 2 : stable;
+        const tlsph_result result = tlsph_step(s, (tlsph_real)dt);
+        if (result) return result;
+        if (left <= stable || s->time > end) s->time = end;
+    }
+    return TLSPH_OK;
+}
+TLSPHI_DEF tlsph_real tlsph_time(const tlsph_solver *s) { return (tlsph_real)s->time; }
+TLSPHI_DEF uint64_t tlsph_step_count(const tlsph_solver *s) { return s->step; }
+TLSPHI_DEF const tlsph_error *tlsph_last_error(const tlsph_solver *s) { return &s->error; }
+TLSPHI_DEF size_t tlsph_count(const tlsph_solver *s) { return s->n; }
+TLSPHI_DEF size_t tlsph_body_count(const tlsph_solver *s) { return s->bodies; }
+TLSPHI_DEF void tlsph_size_read(const tlsph_solver *s, tlsph_size *size) { *size = s->size; }
+
+/* ==== [LEDGER] ===================================================================================================== */
+
+static void tlsphi_ledger_particle(const tlsph_solver *s, size_t a, tlsph_ledger *out) {
+    const size_t D = (size_t)s->dim;
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    const double V = (double)s->V[a];
+    double x[3] = {0, 0, 0}, p[3] = {0, 0, 0}, xp[3];
+    tlsphi_point pt;
+    tlsphi_constitute(s, &s->now, a, NULL, &pt);
+    for (size_t i = 0; i < D; i++) {
+        x[i] = (double)s->now.x[D * a + i];
+        p[i] = V * (double)s->now.p[D * a + i];
+    }
+    tlsphi_cross3(x, p, xp);
+    out->mass += V * (double)m->rho;
+    for (int i = 0; i < 3; i++) {
+        out->linear_momentum[i] += p[i];
+        out->angular_momentum[i] += xp[i];
+        out->centre[i] += V * (double)m->rho * x[i];
+    }
+    out->kinetic_energy += V * (double)pt.kinetic;
+    if (s->thermal) {
+        const double theta = (double)pt.theta, theta_R = (double)m->theta_R, c_v = (double)m->c_v;
+        const double eta = (double)pt.r.entropy + c_v * log(theta / theta_R);
+        out->strain_energy += V * (double)pt.r.energy;
+        out->thermal_energy += V * c_v * (theta - theta_R);
+        out->entropy += V * eta;
+        out->ballistic_energy -= V * theta_R * eta;
+    } else {
+        out->strain_energy += V * ((double)pt.r.energy - (double)m->theta_R * (double)pt.r.entropy);
+    }
+    out->drift_largest = tlsphi_dmax(out->drift_largest, fabs((double)(pt.J / pt.d) - 1));
+    out->jacobian_least = tlsphi_dmin(out->jacobian_least, (double)tlsphi_min(pt.J, pt.d));
+    out->temperature_least = tlsphi_dmin(out->temperature_least, (double)pt.theta);
+    out->temperature_largest = tlsphi_dmax(out->temperature_largest, (double)pt.theta);
+}
+static void tlsphi_ledger_accounts(const tlsph_solver *s, tlsph_ledger *out) {
+    const tlsphi_account *c = &s->account;
+    out->dissipation = c->dissipation;
+    out->dissipation_entropy = c->dissipation_entropy;
+    out->conduction_entropy = c->conduction_entropy;
+    out->external_work = c->external_work;
+    out->external_heat = c->external_heat;
+    out->external_entropy = c->external_entropy;
+    out->projection_work = c->projection_work;
+    out->contact_loss = c->contact_loss;
+    out->least_pair_production = c->least_pair_production < TLSPHI_LARGEST ? c->least_pair_production : 0;
+    for (int i = 0; i < 3; i++) {
+        out->impulse[i] = c->impulse[i];
+        out->angular_impulse[i] = c->angular_impulse[i];
+        out->linear_residual[i] = out->linear_momentum[i] - c->initial_momentum[i] - c->impulse[i];
+        out->angular_residual[i] = out->angular_momentum[i] - c->initial_angular[i] - c->angular_impulse[i];
+    }
+    const int keeps_heat = s->thermal == TLSPH_ENERGY || (s->thermal == TLSPH_ENTROPY && s->dissipation_heats);
+    out->energy_residual = out->total_energy - c->initial_energy - c->external_work - c->external_heat +
+                           (keeps_heat ? 0 : c->dissipation) + (s->thermal == TLSPH_ENERGY ? 0 : c->contact_loss);
+    out->entropy_residual = out->entropy - c->initial_entropy - c->conduction_entropy - c->external_entropy -
+                            (keeps_heat ? c->dissipation_entropy : 0);
+}
+TLSPHI_DEF void tlsph_ledger_read(const tlsph_solver *s, tlsph_ledger *out) {
+    memset(out, 0, sizeof *out);
+    out->jacobian_least = out->temperature_least = TLSPHI_LARGEST;
+    for (size_t a = 0; a < s->n; a++) tlsphi_ledger_particle(s, a, out);
+    for (int i = 0; i < 3; i++) out->centre[i] /= out->mass;
+    out->time = s->time;
+    out->step = s->step;
+    out->time_step = s->last_dt;
+    out->total_energy = out->kinetic_energy + out->strain_energy + out->thermal_energy;
+    out->ballistic_energy += out->total_energy;
+    tlsphi_ledger_accounts(s, out);
+}
+TLSPHI_DEF void tlsph_ledger_reset(tlsph_solver *s) {
+    tlsph_ledger now;
+    memset(&s->account, 0, sizeof s->account);
+    tlsph_ledger_read(s, &now);
+    s->account.initial_energy = now.total_energy;
+    s->account.initial_entropy = now.entropy;
+    s->account.least_pair_production = TLSPHI_LARGEST;
+    for (int i = 0; i < 3; i++) {
+        s->account.initial_momentum[i] = now.linear_momentum[i];
+        s->account.initial_angular[i] = now.angular_momentum[i];
+    }
+}
+
+/* ==== [FIELDS] ===================================================================================================== */
+
+TLSPHI_DEF const char *tlsph_field_name(tlsph_field field) {
+    switch (field) {
+#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return name;
+        TLSPH_FIELDS(TLSPHI_FIELD)
+#undef TLSPHI_FIELD
+    default: return "";
+    }
+}
+TLSPHI_DEF const char *tlsph_field_unit(tlsph_field field) {
+    switch (field) {
+#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return unit;
+        TLSPH_FIELDS(TLSPHI_FIELD)
+#undef TLSPHI_FIELD
+    default: return "";
+    }
+}
+TLSPHI_DEF int tlsph_field_components(tlsph_field field) {
+    switch (field) {
+#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return components;
+        TLSPH_FIELDS(TLSPHI_FIELD)
+#undef TLSPHI_FIELD
+    default: return 0;
+    }
+}
+static int tlsphi_field_writable(tlsph_field field) {
+    switch (field) {
+#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return writable;
+        TLSPH_FIELDS(TLSPHI_FIELD)
+#undef TLSPHI_FIELD
+    default: return 0;
+    }
+}
+
+/* A vector of the solver's dimension as three components. */
+static void tlsphi_out_vector(int dim, const tlsph_real *v, tlsph_real scale, tlsph_real *out) {
+    out[2] = 0;
+    for (int i = 0; i < dim; i++) out[i] = v[i] * scale;
+}
+
+/* Fields that are stored. Returns 0 if `field` is none of them. */
+static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field, tlsph_real *out) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim;
+    const tlsph_real rho = tlsphi_material_of(s, a)->rho;
+    switch (field) {
+    case TLSPH_FIELD_REFERENCE_POSITION: tlsphi_out_vector(dim, s->X + D * a, 1, out); return 1;
+    case TLSPH_FIELD_POSITION: tlsphi_out_vector(dim, s->now.x + D * a, 1, out); return 1;
+    case TLSPH_FIELD_DISPLACEMENT:
+        tlsphi_out_vector(dim, s->now.x + D * a, 1, out);
+        for (size_t i = 0; i < D; i++) out[i] -= s->X[D * a + i];
+        return 1;
+    case TLSPH_FIELD_VELOCITY: tlsphi_out_vector(dim, s->now.p + D * a, 1 / rho, out); return 1;
+    case TLSPH_FIELD_MOMENTUM: tlsphi_out_vector(dim, s->now.p + D * a, 1, out); return 1;
+    case TLSPH_FIELD_BOUNDARY_AREA: tlsphi_out_vector(dim, s->B + D * a, 1, out); return 1;
+    case TLSPH_FIELD_F: tlsphi_expand(dim, s->now.F + D * D * a, 1, out); return 1;
+    case TLSPH_FIELD_VELOCITY_GRADIENT: tlsphi_expand(dim, s->rate_F + D * D * a, 0, out); return 1;
+    case TLSPH_FIELD_VOLUME: *out = s->V[a]; return 1;
+    case TLSPH_FIELD_MASS: *out = s->V[a] * rho; return 1;
+    case TLSPH_FIELD_NEIGHBOURS: *out = (tlsph_real)(s->first[a + 1] - s->first[a]); return 1;
+    default: return 0;
+    }
+}
+static tlsph_real tlsphi_von_mises(const tlsphi_point *pt, tlsph_real volume) {
+    tlsph_real sigma[9], square = 0;
+    tlsphi_product_transposed(3, pt->P, pt->F, sigma);
+    const tlsph_real mean = (sigma[0] + sigma[4] + sigma[8]) / 3;
+    for (int i = 0; i < 9; i++) {
+        const tlsph_real deviator = (sigma[i] - (i % 4 ? 0 : mean)) / volume;
+        square += deviator * deviator;
+    }
+    return tlsphi_sqrt(TLSPHI_R(1.5) * square);
+}
+/* Fields that follow from the state. */
+static void tlsphi_read_derived(const tlsph_solver *s, size_t a, tlsph_field field, tlsph_real *out) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    tlsphi_point pt;
+    tlsphi_constitute(s, &s->now, a, NULL, &pt);
+    const tlsph_real weight = m->entropic ? pt.theta / m->theta_R : 1, volume = m->kind == TLSPH_LINEAR ? 1 : pt.J;
+    const tlsph_real internal = pt.r.energy + (s->thermal ? m->c_v * (pt.theta - m->theta_R) : 0);
+    const tlsph_real entropy = pt.r.entropy + (s->thermal ? m->c_v * tlsphi_log(pt.theta / m->theta_R) : 0);
+    switch (field) {
+    case TLSPH_FIELD_H: memcpy(out, pt.H, sizeof pt.H); break;
+    case TLSPH_FIELD_J: *out = pt.J; break;
+    case TLSPH_FIELD_DRIFT: *out = pt.J / pt.d - 1; break;
+    case TLSPH_FIELD_TEMPERATURE: *out = pt.theta; break;
+    case TLSPH_FIELD_ENERGY: *out = pt.kinetic + internal; break;
+    case TLSPH_FIELD_ENTROPY: *out = entropy; break;
+    case TLSPH_FIELD_STRESS: memcpy(out, pt.P, sizeof pt.P); break;
+    case TLSPH_FIELD_PRESSURE: *out = tlsphi_dot(9, pt.P, pt.F) / (3 * volume); break;
+    case TLSPH_FIELD_VON_MISES: *out = tlsphi_von_mises(&pt, volume); break;
+    case TLSPH_FIELD_SIGMA_F:
+        for (int i = 0; i < 9; i++)
+            out[i] = m->kind == TLSPH_USER || m->kind == TLSPH_LINEAR ? pt.r.e_F[i] - pt.theta * pt.r.eta_F[i] : weight * pt.dev.a * pt.F[i];
+        break;
+    case TLSPH_FIELD_SIGMA_H: for (int i = 0; i < 9; i++) out[i] = weight * pt.dev.b * pt.H[i]; break;
+    case TLSPH_FIELD_SIGMA_J: *out = pt.Sigma_J; break;
+    case TLSPH_FIELD_INTERNAL_ENERGY: *out = internal; break;
+    case TLSPH_FIELD_HELMHOLTZ_ENERGY: *out = internal - pt.theta * entropy; break;
+    case TLSPH_FIELD_P_WAVE_SPEED: *out = pt.c_p; break;
+    case TLSPH_FIELD_S_WAVE_SPEED: *out = pt.c_s; break;
+    default: break;
+    }
+}
+static int tlsphi_field_exists(const tlsph_solver *s, tlsph_field field) {
+    if ((unsigned)field >= (unsigned)TLSPH_FIELD_COUNT) return 0;
+    return s->thermal || (field != TLSPH_FIELD_TEMPERATURE && field != TLSPH_FIELD_ENERGY && field != TLSPH_FIELD_ENTROPY);
+}
+TLSPHI_DEF tlsph_result tlsph_read(const tlsph_solver *s, tlsph_field field, tlsph_real *out) {
+    if (!tlsphi_field_exists(s, field)) return TLSPH_ERROR_FIELD;
+    if (!out) return TLSPH_ERROR_ARGUMENT;
+    const size_t components = (size_t)tlsph_field_components(field);
+    for (size_t i = 0; i < s->blocks; i++)
+        for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
+            tlsph_real *to = out + components * s->host[a];
+            if (field == TLSPH_FIELD_BODY) *to = (tlsph_real)s->block[i].body;
+            else if (!tlsphi_read_stored(s, a, field, to)) tlsphi_read_derived(s, a, field, to);
+        }
+    return TLSPH_OK;
+}
+
+/* Sets F of one particle and what follows from it. */
+static void tlsphi_write_gradient(tlsph_solver *s, size_t a, const tlsph_real *F) {
+    const int dim = s->dim;
+    const size_t dd = (size_t)(dim * dim);
+    const int linear = tlsphi_material_of(s, a)->kind == TLSPH_LINEAR;
+    tlsph_real full[9], H[9];
+    tlsphi_shrink(dim, F, s->now.F + dd * a);
+    tlsphi_expand(dim, s->now.F + dd * a, 1, full);
+    if (s->has_H) {
+        tlsph_cofactor(full, H);
+        tlsphi_shrink(dim, H, s->now.H + dd * a);
+    }
+    if (s->has_J) s->now.J[a] = linear ? full[0] + full[4] + full[8] - 2 : tlsph_determinant(full);
+}
+static void tlsphi_write_particle(tlsph_solver *s, size_t a, tlsph_field field, const tlsph_real *in) {
+    const size_t D = (size_t)s->dim;
+    const tlsph_real rho = tlsphi_material_of(s, a)->rho;
+    switch (field) {
+    case TLSPH_FIELD_POSITION: memcpy(s->now.x + D * a, in, D * sizeof *in); break;
+    case TLSPH_FIELD_VELOCITY: for (size_t i = 0; i < D; i++) s->now.p[D * a + i] = rho * in[i]; break;
+    case TLSPH_FIELD_F: tlsphi_write_gradient(s, a, in); break;
+    case TLSPH_FIELD_J: s->now.J[a] = *in; break;
+    default: break;
+    }
+}
+/* Values that no state may have. */
+static tlsph_result tlsphi_check_input(tlsph_solver *s, tlsph_field field, const tlsph_real *in) {
+    const size_t components = (size_t)tlsph_field_components(field);
+    for (size_t a = 0; a < s->n; a++)
+        for (size_t k = 0; k < components; k++) {
+            const tlsph_real value = in[components * a + k];
+            if (!tlsphi_finite(value))
+                return tlsphi_fail(&s->error, TLSPH_ERROR_NOT_FINITE, "write", tlsph_field_name(field), a, (double)value, 0, "finite");
+            if (field == TLSPH_FIELD_TEMPERATURE && !(value > 0))
+                return tlsphi_fail(&s->error, TLSPH_ERROR_TEMPERATURE, "write", "temperature", a, (double)value, 0, "more than 0");
+        }
+    return TLSPH_OK;
+}
+TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tlsph_real *in) {
+    if (!tlsphi_field_exists(s, field) || !tlsphi_field_writable(field) || (field == TLSPH_FIELD_J && !s->has_J))
+        return tlsphi_fail(&s->error, TLSPH_ERROR_FIELD, "write", tlsph_field_name(field), TLSPH_NO_PARTICLE, (double)field, 0,
+                           "a writable field that the scene evolves");
+    if (!in) return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "write", "in", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
+    tlsph_result result = tlsphi_check_input(s, field, in);
+    if (result) return result;
+    const size_t components = (size_t)tlsph_field_components(field);
+    const tlsph_real *theta = field == TLSPH_FIELD_TEMPERATURE ? in : NULL;
+    tlsphi_keep_state(s);
+    for (size_t a = 0; a < s->n; a++) tlsphi_write_particle(s, a, field, in + components * s->host[a]);
+    if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s);
+    for (size_t a = 0; s->thermal && a < s->n; a++) tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : s->theta[a]);
+    const tlsphi_block *bad = tlsphi_evaluate(s);
+    if (bad) {
+        result = tlsphi_describe_failure(s, bad, "write");
+        tlsphi_restore_state(s);
+        return result;
+    }
+    if (s->step == 0) tlsph_ledger_reset(s);
+    return TLSPH_OK;
+}
+
+TLSPHI_DEF void tlsph_operator_view(const tlsph_solver *s, tlsph_operator *view) {
+    view->count = s->n;
+    view->pairs = s->pairs;
+    view->dimension = s->dim;
+    view->first = s->first;
+    view->neighbours = s->neighbour;
+    view->vectors = s->g;
+    view->correction = s->M;
+    view->volumes = s->V;
+    view->boundary = s->B;
+    view->spacing = s->tau;
+    view->host = s->host;
+}
+
+/* ==== [CHECKPOINT] =================================================================================================
+   Little-endian bytes: "TLSPHCK1", size of a real, fingerprint of the description, time, step, first and last dt, the
+   ledger's accounts, the state in the host's order, and a checksum (FNV-1a, which sees every single changed byte). */
+
+#define TLSPHI_ACCOUNTS (sizeof(tlsphi_account) / sizeof(double))
+#define TLSPHI_HEADER (8 + 8 + 8 + 8 + 8 + 8 + 8 + 8 * TLSPHI_ACCOUNTS)
+
+static uint64_t tlsphi_hash(uint64_t h, const unsigned char *bytes, size_t n) {
+    for (size_t i = 0; i < n; i++) h = (h ^ bytes[i]) * 0x100000001b3u;
+    return h;
+}
+static void tlsphi_put(unsigned char **at, uint64_t bits, int bytes) {
+    for (int i = 0; i < bytes; i++) *(*at)++ = (unsigned char)(bits >> (8 * i) & 255);
+}
+static uint64_t tlsphi_get(const unsigned char **at, int bytes) {
+    uint64_t bits = 0;
+    for (int i = 0; i < bytes; i++) bits |= (uint64_t) * (*at)++ << (8 * i);
+    return bits;
+}
+static void tlsphi_put_double(unsigned char **at, double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    tlsphi_put(at, bits, 8);
+}
+static double tlsphi_get_double(const unsigned char **at) {
+    const uint64_t bits = tlsphi_get(at, 8);
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+#ifdef TLSPH_REAL_FLOAT
+typedef uint32_t tlsphi_bits;
+#else
+typedef uint64_t tlsphi_bits;
+#endif
+static void tlsphi_put_real(unsigned char **at, tlsph_real x) {
+    tlsphi_bits bits;
+    memcpy(&bits, &x, sizeof bits);
+    tlsphi_put(at, bits, (int)sizeof bits);
+}
+static tlsph_real tlsphi_get_real(const unsigned char **at) {
+    const tlsphi_bits bits = (tlsphi_bits)tlsphi_get(at, (int)sizeof(tlsphi_bits));
+    tlsph_real x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* The state arrays with their components, in the order of the checkpoint. */
+static int tlsphi_state_arrays(const tlsph_solver *s, tlsph_real *array[6], size_t components[6]) {
+    const size_t D = (size_t)s->dim;
+    tlsph_real *const all[6] = {s->now.x, s->now.p, s->now.F, s->now.H, s->now.J, s->now.E};
+    const size_t sizes[6] = {D, D, D * D, D * D, 1, 1};
+    int count = 0;
+    for (int i = 0; i < 6; i++) {
+        if (!all[i]) continue;
+        array[count] = all[i];
+        components[count++] = sizes[i];
+    }
+    return count;
+}
+TLSPHI_DEF size_t tlsph_save_size(const tlsph_solver *s) {
+    return TLSPHI_HEADER + s->state_reals * sizeof(tlsph_real) + 8;
+}
+TLSPHI_DEF tlsph_result tlsph_save(const tlsph_solver *s, void *buffer, size_t size) {
+    unsigned char *at = (unsigned char *)buffer;
+    tlsph_real *array[6];
+    size_t components[6];
+    double accounts[TLSPHI_ACCOUNTS];
+    if (!buffer) return TLSPH_ERROR_ARGUMENT;
+    if (size < tlsph_save_size(s)) return TLSPH_ERROR_SIZE;
+    memcpy(at, "TLSPHCK1", 8);
+    at += 8;
+    tlsphi_put(&at, sizeof(tlsph_real), 8);
+    tlsphi_put(&at, s->fingerprint, 8);
+    tlsphi_put_double(&at, s->time);
+    tlsphi_put(&at, s->step, 8);
+    tlsphi_put_double(&at, s->first_dt);
+    tlsphi_put_double(&at, s->last_dt);
+    memcpy(accounts, &s->account, sizeof accounts);
+    for (size_t i = 0; i < TLSPHI_ACCOUNTS; i++) tlsphi_put_double(&at, accounts[i]);
+    const int arrays = tlsphi_state_arrays(s, array, components);
+    for (int k = 0; k < arrays; k++)
+        for (size_t h = 0; h < s->n; h++)
+            for (size_t i = 0; i < components[k]; i++) tlsphi_put_real(&at, array[k][components[k] * s->inner[h] + i]);
+    tlsphi_put(&at, tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)buffer, tlsph_save_size(s) - 8), 8);
+    return TLSPH_OK;
+}
+/* Whether the bytes are an undamaged checkpoint of this scene. */
+static tlsph_result tlsphi_check_checkpoint(tlsph_solver *s, const unsigned char *bytes, size_t size) {
+    const char *const field = "checkpoint";
+    const size_t wanted = tlsph_save_size(s);
+    if (size < wanted)
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "bytes", TLSPH_NO_PARTICLE, (double)size, (double)wanted, "as saved");
+    const unsigned char *at = bytes + wanted - 8;
+    if (memcmp(bytes, "TLSPHCK1", 8) || tlsphi_get(&at, 8) != tlsphi_hash(0xcbf29ce484222325u, bytes, wanted - 8))
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", field, TLSPH_NO_PARTICLE, 0, 0, "undamaged data of tlsph_save");
+    at = bytes + 8;
+    if (tlsphi_get(&at, 8) != sizeof(tlsph_real) || tlsphi_get(&at, 8) != s->fingerprint)
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "fingerprint", TLSPH_NO_PARTICLE, 0, 0, "a checkpoint of the same description");
+    return TLSPH_OK;
+}
+TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_t size) {
+    const unsigned char *at = (const unsigned char *)buffer;
+    tlsph_real *array[6];
+    size_t components[6];
+    double accounts[TLSPHI_ACCOUNTS];
+    if (!buffer) return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "restore", "buffer", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
+    const tlsph_result result = tlsphi_check_checkpoint(s, at, size);
+    if (result) return result;
+    at += 24;
+    s->time = tlsphi_get_double(&at);
+    s->step = tlsphi_get(&at, 8);
+    s->first_dt = tlsphi_get_double(&at);
+    s->last_dt = tlsphi_get_double(&at);
+    for (size_t i = 0; i < TLSPHI_ACCOUNTS; i++) accounts[i] = tlsphi_get_double(&at);
+    memcpy(&s->account, accounts, sizeof accounts);
+    const int arrays = tlsphi_state_arrays(s, array, components);
+    for (int k = 0; k < arrays; k++)
+        for (size_t h = 0; h < s->n; h++)
+            for (size_t i = 0; i < components[k]; i++) array[k][components[k] * s->inner[h] + i] = tlsphi_get_real(&at);
+    tlsphi_evaluate(s);
+    return TLSPH_OK;
+}
+
+/* ==== [VALIDATION] ================================================================================================= */
+
+static tlsph_result tlsphi_check_range(tlsphi_plan *plan, const char *field, double value, double low, double high, const char *allowed) {
+    return value >= low && value <= high ? TLSPH_OK
+                                         : tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, field, TLSPH_NO_PARTICLE, value, low, allowed);
+}
+static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
+    const tlsph_desc *d = plan->desc;
+    const struct { const char *name; double value, low, high; const char *allowed; } range[] = {
+        {"cookie", (double)d->cookie, TLSPHI_COOKIE, TLSPHI_COOKIE, "what tlsph_desc_default sets"},
+        {"dimension", d->dimension, 2, 3, "2 or 3"},
+        {"unknowns", (double)d->unknowns, TLSPH_PF, TLSPH_PFH, "a tlsph_unknowns"},
+        {"thermal", (double)d->thermal, TLSPH_ISOTHERMAL, TLSPH_ENTROPY, "a tlsph_thermal"},
+        {"operator_kind", (double)d->operator_kind, TLSPH_CORRECTED_KERNEL, TLSPH_GIVEN, "a tlsph_operator_kind"},
+        {"kernel", (double)d->kernel, TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC, "a tlsph_kernel"},
+        {"support", (double)d->support, 1e-3, 100, "0.001 to 100"},
+        {"dissipation", (double)d->dissipation, TLSPH_LIMITED, TLSPH_NO_DISSIPATION, "a tlsph_dissipation"},
+        {"volume_coupling", (double)d->volume_coupling, TLSPH_SPLIT, TLSPH_JOINT_AS_PRINTED, "a tlsph_volume_coupling"},
+        {"drift_stiffness", (double)d->drift_stiffness, 0, 1e6, "0 to 1e6"},
+        {"drift_scale", (double)d->drift_scale, 1e-6, 1e6, "1e-6 to 1e6"},
+        {"jump_share", (double)d->jump_share, 0, 100, "0 to 100"},
+        {"drift_relaxation", (double)d->drift_relaxation, 0, 100, "0 to 100"},
+        {"conduction", (double)d->conduction, TLSPH_COMPACT, TLSPH_DOUBLE_GRADIENT, "a tlsph_conduction"},
+        {"integrator", (double)d->integrator, TLSPH_RK2, TLSPH_RK2, "a tlsph_integrator"},
+        {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
+        {"threads", d->threads, 0, 4096, "0 to 4096"},
+        {"material_count", (double)d->material_count, 1, 256, "1 to 256"},
+        {"particles.count", (double)d->particles.count, 2, 4294967294.0, "2 to 2^32 - 2"},
+    };
+    for (size_t i = 0; i < sizeof range / sizeof range[0]; i++) {
+        const tlsph_result r = tlsphi_check_range(plan, range[i].name, range[i].value, range[i].low, range[i].high, range[i].allowed);
+        if (r) return r;
+    }
+    const int pointers = d->materials && d->particles.positions && (d->particles.volumes || d->operator_kind == TLSPH_CELLS) &&
+                         (!d->condition_count || d->conditions) &&
+                         (d->operator_kind != TLSPH_CELLS || (d->particles.cells && d->particles.cell_count)) &&
+                         (d->operator_kind != TLSPH_GIVEN || (d->particles.first && d->particles.neighbours && d->particles.pair_vectors));
+    if (!pointers)
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "a pointer", TLSPH_NO_PARTICLE, 0, 0,
+                                "not NULL: materials, positions, volumes, conditions and what the operator needs");
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_check_particles(tlsphi_plan *plan) {
+    const tlsph_desc *d = plan->desc;
+    const tlsph_particles *p = &d->particles;
+    for (size_t a = 0; a < p->count; a++) {
+        for (int i = 0; i < d->dimension; i++)
+            if (!tlsphi_finite(p->positions[3 * a + (size_t)i]))
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "position", a, (double)p->positions[3 * a + (size_t)i], 0, "finite");
+        for (int i = 0; i < 2; i++) {
+            const tlsph_real *const array = i ? p->weights : p->volumes;
+            if (!array || (array[a] > 0 && tlsphi_finite(array[a]))) continue;
+            return tlsphi_plan_fail(plan, tlsphi_finite(array[a]) ? TLSPH_ERROR_VOLUME : TLSPH_ERROR_NOT_FINITE, i ? "weight" : "volume", a,
+                                    (double)array[a], 0, "more than 0, finite");
+        }
+        if (p->materials && p->materials[a] >= d->material_count)
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, "material index", a, p->materials[a], (double)d->material_count,
+                                    "less than material_count");
+    }
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_check_materials(tlsphi_plan *plan) {
+    for (size_t i = 0; i < plan->desc->material_count; i++) {
+        double value;
+        const char *allowed, *fault = tlsphi_material_fault(plan->desc->materials + i, plan->desc->thermal != TLSPH_ISOTHERMAL, &value, &allowed);
+        if (fault) return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, fault, TLSPH_NO_PARTICLE, value, 0, allowed);
+    }
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condition *c) {
+    const size_t n = plan->n;
+    const int plane = c->kind == TLSPH_ROLLER || c->kind == TLSPH_TANGENT || c->kind == TLSPH_WALL;
+    const tlsph_real NN = tlsphi_dot(plan->dim, c->normal, c->normal);
+    if (c->cookie != TLSPHI_COOKIE || (unsigned)c->kind > (unsigned)TLSPH_WALL)
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "cookie or kind", TLSPH_NO_PARTICLE, (double)c->kind, 0, "what tlsph_condition_default sets");
+    if (!c->particles && c->count)
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particles", TLSPH_NO_PARTICLE, (double)c->count, 0, "not NULL, or count 0 for all");
+    if (!tlsphi_all_finite(c->normal, 3) || !tlsphi_all_finite(c->value, 3) || !tlsphi_all_finite(c->point, 3))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "value, normal or point", TLSPH_NO_PARTICLE, 0, 0, "finite");
+    if (plane && !(NN > 0))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "normal", TLSPH_NO_PARTICLE, (double)NN, 0, "not zero for this kind");
+    if (tlsphi_is_thermal(c->kind) && !plan->desc->thermal)
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0, "no heat in an isothermal scene");
+    if (c->kind == TLSPH_TEMPERATURE && !c->values && !(c->value[0] > 0))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "temperature", TLSPH_NO_PARTICLE, (double)c->value[0], 0, "more than 0");
+    for (size_t i = 0; i < c->count; i++)
+        if (c->particles[i] >= n)
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particle number", c->particles[i], (double)c->particles[i], (double)n,
+                                    "less than the number of particles");
+    const size_t area_count = (c->particles ? c->count : n) * (c->kind == TLSPH_PRESSURE ? 3 : 1);
+    for (size_t i = 0; c->areas && i < area_count; i++)
+        if (!tlsphi_finite(c->areas[i]))
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "area", TLSPH_NO_PARTICLE, (double)c->areas[i], 0, "finite");
+    return TLSPH_OK;
+}
+
+/* ==== [CREATION] =================================================================================================== */
+
+static size_t tlsphi_set_size(const tlsphi_plan *plan, const tlsph_condition *c) { return c->particles ? c->count : plan->n; }
+static uint32_t tlsphi_set_host(const tlsph_condition *c, size_t i) { return c->particles ? c->particles[i] : (uint32_t)i; }
+static int tlsphi_is_constraint(tlsph_condition_kind kind) { return kind == TLSPH_CLAMPED || kind == TLSPH_ROLLER || kind == TLSPH_TANGENT; }
+
+/* Adds what is new in direction e to the orthonormal fixed directions of a particle (Gram-Schmidt). */
+static void tlsphi_fix_direction(tlsphi_plan *plan, uint32_t host, const double e[3]) {
+    const int dim = plan->dim;
+    double *basis = plan->fixed_direction + (size_t)(dim * dim) * host, rest[3] = {e[0], e[1], e[2]}, norm = 0;
+    const int have = plan->fixed[host];
+    if (have == dim) return;
+    for (int k = 0; k < have; k++) {
+        double along = 0;
+        for (int i = 0; i < dim; i++) along += basis[dim * k + i] * rest[i];
+        for (int i = 0; i < dim; i++) rest[i] -= along * basis[dim * k + i];
+    }
+    for (int i = 0; i < dim; i++) norm += rest[i] * rest[i];
+    if (norm < 1e-20) return;
+    for (int i = 0; i < dim; i++) basis[dim * have + i] = rest[i] / sqrt(norm);
+    plan->fixed[host]++;
+    plan->fixes++;
+}
+static void tlsphi_unit_normal(const tlsph_condition *c, int dim, double N[3]) {
+    double norm = 0;
+    N[2] = 0;
+    for (int i = 0; i < dim; i++) norm += (double)c->normal[i] * (double)c->normal[i];
+    for (int i = 0; i < dim; i++) N[i] = (double)c->normal[i] / sqrt(norm);
+}
+/* The directions that a constraint fixes: N; or all that is perpendicular to N; or everything. */
+static void tlsphi_fix_particle(tlsphi_plan *plan, const tlsph_condition *c, uint32_t host) {
+    double N[3];
+    if (c->kind == TLSPH_ROLLER) {
+        tlsphi_unit_normal(c, plan->dim, N);
+        tlsphi_fix_direction(plan, host, N);
+        return;
+    }
+    for (int axis = 0; axis < plan->dim; axis++) {
+        double e[3] = {0, 0, 0};
+        e[axis] = 1;
+        if (c->kind == TLSPH_TANGENT) {
+            tlsphi_unit_normal(c, plan->dim, N);
+            for (int i = 0; i < plan->dim; i++) e[i] -= N[axis] * N[i];
+        }
+        tlsphi_fix_direction(plan, host, e);
+    }
+}
+static tlsph_result tlsphi_plan_conditions(tlsphi_plan *plan) {
+    const tlsph_desc *d = plan->desc;
+    size_t constraints = 0;
+    for (size_t k = 0; k < d->condition_count; k++) {
+        const tlsph_result r = tlsphi_check_condition(plan, d->conditions + k);
+        if (r) return r;
+        constraints += tlsphi_is_constraint(d->conditions[k].kind) ? 1 : 0;
+        if (d->mirror_gradients && (d->conditions[k].kind == TLSPH_ROLLER || d->conditions[k].kind == TLSPH_TANGENT))
+            plan->mirrors += tlsphi_set_size(plan, d->conditions + k);
+    }
+    if (!constraints) return TLSPH_OK;
+    plan->fixed = TLSPHI_SCRATCH(plan, uint8_t, plan->n);
+    plan->fixed_direction = TLSPHI_SCRATCH(plan, double, (size_t)(plan->dim * plan->dim) * plan->n);
+    if (!plan->fixed || !plan->fixed_direction) return tlsphi_no_memory(plan, 73.0 * (double)plan->n);
+    for (size_t k = 0; k < d->condition_count; k++)
+        for (size_t i = 0; tlsphi_is_constraint(d->conditions[k].kind) && i < tlsphi_set_size(plan, d->conditions + k); i++)
+            tlsphi_fix_particle(plan, d->conditions + k, tlsphi_set_host(d->conditions + k, i));
+    return TLSPH_OK;
+}
+
+static void tlsphi_smoothing_length(tlsphi_plan *plan) {
+    double spacing = (double)plan->desc->particles.spacing, mean = 0;
+    if (!(spacing > 0)) {
+        for (size_t a = 0; a < plan->n; a++) mean += plan->weights ? (double)plan->weights[a] : plan->volume[a];
+        mean /= (double)plan->n;
+        spacing = plan->dim == 3 ? cbrt(mean) : sqrt(mean);
+    }
+    plan->h = spacing * (double)plan->desc->support;
+}
+static void tlsphi_count_blocks(tlsphi_plan *plan) {
+    for (size_t a = 0, in_block = 0; a < plan->n; a++, in_block++) {
+        if (a && plan->body[a] == plan->body[a - 1] && in_block < TLSPHI_BLOCK) continue;
+        plan->blocks++;
+        in_block = 0;
+    }
+}
+
+/* Everything that creation can find out without the solver's memory. Leaves scratch for tlsphi_plan_release. */
+static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, tlsph_error *error) {
+    tlsph_result r;
+    memset(plan, 0, sizeof *plan);
+    plan->desc = desc;
+    plan->error = error;
+    tlsphi_no_error(error);
+    if (!desc) return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "desc", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
+    if ((r = tlsphi_check_description(plan))) return r;
+    plan->allocator = tlsphi_allocator(&desc->allocator);
+    plan->dim = desc->dimension;
+    plan->n = desc->particles.count;
+    plan->weights = desc->particles.weights ? desc->particles.weights : desc->particles.volumes;
+    if ((r = tlsphi_check_particles(plan)) || (r = tlsphi_check_materials(plan)) || (r = tlsphi_plan_conditions(plan))) return r;
+    if (desc->operator_kind == TLSPH_CELLS && (r = tlsphi_cells_build(plan))) return r;
+    if (desc->operator_kind == TLSPH_GIVEN && (r = tlsphi_given_check(plan))) return r;
+    tlsphi_smoothing_length(plan);
+    if ((r = tlsphi_grid_build(plan))) return r;
+    const size_t most = tlsphi_count_pairs(plan), D = (size_t)plan->dim;
+    uint32_t *list = TLSPHI_SCRATCH(plan, uint32_t, most);
+    double *g = TLSPHI_SCRATCH(plan, double, D * most);
+    uint32_t *parent = TLSPHI_SCRATCH(plan, uint32_t, plan->n);
+    if (!list || !g || !parent) return tlsphi_no_memory(plan, 32.0 * (double)most);
+    if (desc->operator_kind == TLSPH_CORRECTED_KERNEL && !(plan->correction = TLSPHI_SCRATCH(plan, double, D * D * plan->n)))
+        return tlsphi_no_memory(plan, 72.0 * (double)plan->n);
+    for (size_t a = 0; a < plan->n; a++) parent[a] = (uint32_t)a;
+    if ((r = tlsphi_survey(plan, parent, list, g))) return r;
+    plan->antisymmetric = 1;
+    if (plan->correction) tlsphi_test_antisymmetry(plan, list, g);
+    if ((r = tlsphi_order(plan, parent))) return r;
+    tlsphi_count_blocks(plan);
+    return TLSPH_OK;
+}
+
+static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
+    const tlsph_desc *d = plan->desc;
+    s->dim = d->dimension;
+    s->thermal = (int)d->thermal;
+    s->has_H = d->unknowns == TLSPH_PFHJ || d->unknowns == TLSPH_PFH;
+    s->has_J = d->unknowns == TLSPH_PFJ || d->unknowns == TLSPH_PFHJ;
+    s->corrected = !plan->antisymmetric;
+    s->audit = d->audit;
+    s->projection = d->projection;
+    s->dissipation_heats = d->dissipation_heats;
+    s->threads = d->threads;
+    s->dissipation = d->dissipation;
+    s->coupling = d->volume_coupling;
+    s->conduction = d->conduction;
+    s->drift_stiffness = d->drift_stiffness;
+    s->drift_scale = d->drift_scale;
+    s->jump_share = d->volume_coupling == TLSPH_SPLIT ? d->jump_share : 1;
+    s->drift_relaxation = d->drift_relaxation;
+    s->cfl = d->cfl;
+    s->n = plan->n;
+    s->pairs = plan->pairs;
+    s->blocks = plan->blocks;
+    s->bodies = plan->bodies;
+    s->fixes = plan->fixes;
+    s->mirrors = plan->mirrors;
+    s->material_count = d->material_count;
+    s->run = d->run;
+    s->run_user = d->run_user;
+    for (size_t i = 0; i < d->material_count; i++) {
+        s->conducts |= s->thermal && d->materials[i].conductivity > 0;
+        s->has_user |= d->materials[i].kind == TLSPH_USER;
+    }
+    for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
+}
+
+static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
+    const size_t D = (size_t)s->dim, n = s->n;
+    s->state_reals = n * (2 * D + D * D + (s->has_H ? D * D : 0) + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0));
+    s->now_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
+    s->old_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
+    if (!arena->memory || arena->overflow) return;
+    for (int i = 0; i < 2; i++) {
+        tlsphi_state *u = i ? &s->old : &s->now;
+        tlsph_real *at = i ? s->old_memory : s->now_memory;
+        memset(u, 0, sizeof *u);
+        u->x = at; at += D * n;
+        u->p = at; at += D * n;
+        u->F = at; at += D * D * n;
+        if (s->has_H) { u->H = at; at += D * D * n; }
+        if (s->has_J) { u->J = at; at += n; }
+        if (s->thermal) u->E = at;
+    }
+}
+static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
+    const size_t D = (size_t)s->dim, n = s->n;
+    s->rate_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    s->rate_F = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    s->v = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    s->PM = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    s->A = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    s->wave = TLSPHI_TAKE(arena, tlsph_real, 4 * n);
+    s->w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * n) : s->v;
+    s->grad_w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
+    if (s->has_J) {
+        s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
+        s->S = TLSPHI_TAKE(arena, tlsph_real, n);
+        s->grad_S = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    }
+    if (s->thermal) {
+        s->rate_E = TLSPHI_TAKE(arena, tlsph_real, n);
+        s->theta = TLSPHI_TAKE(arena, tlsph_real, n);
+    }
+    if (s->conducts) {
+        s->grad_theta = TLSPHI_TAKE(arena, tlsph_real, D * n);
+        s->heat = TLSPHI_TAKE(arena, tlsph_real, D * n);
+        s->h_J = TLSPHI_TAKE(arena, tlsph_real, n);
+    }
+}
+static void tlsphi_layout_loads(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_plan *plan) {
+    s->load = TLSPHI_TAKE(arena, tlsphi_load, s->loads);
+    for (size_t k = 0, at = 0; k < plan->desc->condition_count; k++) {
+        const tlsph_condition *c = plan->desc->conditions + k;
+        const size_t count = tlsphi_set_size(plan, c), components = (size_t)tlsphi_condition_components(c->kind);
+        const int has_area = c->kind == TLSPH_TRACTION || c->kind == TLSPH_HEAT_FLUX || c->kind == TLSPH_PRESSURE;
+        tlsphi_load load;
+        if (tlsphi_is_constraint(c->kind)) continue;
+        memset(&load, 0, sizeof load);
+        load.given = *c;
+        load.given.count = count;
+        load.inner = TLSPHI_TAKE(arena, uint32_t, count);
+        load.host = TLSPHI_TAKE(arena, uint32_t, count);
+        load.area = TLSPHI_TAKE(arena, tlsph_real, has_area ? count * (c->kind == TLSPH_PRESSURE ? (size_t)s->dim : 1) : 0);
+        load.values = TLSPHI_TAKE(arena, tlsph_real, count * components);
+        load.X = TLSPHI_TAKE(arena, tlsph_real, c->values ? 3 * count : 0);
+        load.x = TLSPHI_TAKE(arena, tlsph_real, c->values ? 3 * count : 0);
+        load.before = TLSPHI_TAKE(arena, tlsph_real, c->kind == TLSPH_VELOCITY ? count : 0);
+        if (s->load && !arena->overflow) s->load[at++] = load;
+    }
+}
+/* Gives every array its place. Called twice: without memory to count, then with it. */
+static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_plan *plan) {
+    const size_t D = (size_t)s->dim, n = s->n;
+    (void)TLSPHI_TAKE(arena, tlsph_solver, 1);
+    s->materials = TLSPHI_TAKE(arena, tlsphi_material, s->material_count);
+    if (s->material_count > 1) s->material_of = TLSPHI_TAKE(arena, uint8_t, n);
+    s->block = TLSPHI_TAKE(arena, tlsphi_block, s->blocks);
+    s->body = TLSPHI_TAKE(arena, tlsphi_body, s->bodies);
+    s->host = TLSPHI_TAKE(arena, uint32_t, n);
+    s->inner = TLSPHI_TAKE(arena, uint32_t, n);
+    s->X = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    s->V = TLSPHI_TAKE(arena, tlsph_real, n);
+    s->B = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    s->tau = TLSPHI_TAKE(arena, tlsph_real, n);
+    tlsphi_layout_state(s, arena);
+    tlsphi_layout_work(s, arena);
+    if (s->corrected) s->M = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    s->fix = TLSPHI_TAKE(arena, tlsphi_fix, s->fixes);
+    s->mirror = TLSPHI_TAKE(arena, tlsphi_mirror, s->mirrors ? s->mirrors + 1 : 0);
+    if (s->mirrors) s->mirror_of = TLSPHI_TAKE(arena, uint32_t, n);
+    tlsphi_layout_loads(s, arena, plan);
+    const size_t before_pairs = arena->used;
+    s->first = TLSPHI_TAKE(arena, size_t, n + 1);
+    s->size.bytes_per_particle = (before_pairs + (n + 1) * sizeof(size_t)) / n;
+    s->size.bytes_per_pair = sizeof(uint32_t) + D * sizeof(tlsph_real);
+    s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
+    s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
+    s->size.bytes = arena->used;
+    s->size.pairs = s->pairs;
+    s->size.neighbours_least = plan->least;
+    s->size.neighbours_most = plan->most;
+}
+
+/* -- filling the block -- */
+
+static void tlsphi_fill_blocks(tlsph_solver *s, const tlsphi_plan *plan) {
+    size_t k = 0;
+    for (size_t a = 0, in_block = 0; a < s->n; a++, in_block++) {
+        const int new_body = !a || plan->body[a] != plan->body[a - 1];
+        if (new_body) s->body[plan->body[a]].first = (uint32_t)a;
+        if (new_body || in_block >= TLSPHI_BLOCK) {
+            s->block[k].begin = (uint32_t)a;
+            s->block[k++].body = plan->body[a];
+            in_block = 0;
+        }
+        s->block[k - 1].end = (uint32_t)(a + 1);
+    }
+}
+static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = 0; a < s->n; a++) {
+        const uint32_t h = plan->host[a];
+        s->host[a] = h;
+        s->inner[h] = (uint32_t)a;
+        s->V[a] = (tlsph_real)tlsphi_plan_volume(plan, h);
+        if (s->material_of) s->material_of[a] = plan->desc->particles.materials ? plan->desc->particles.materials[h] : 0;
+        for (size_t i = 0; i < D; i++) {
+            s->X[D * a + i] = s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
+            s->now.F[D * D * a + (D + 1) * i] = 1;
+            if (s->has_H) s->now.H[D * D * a + (D + 1) * i] = 1;
+        }
+        if (s->has_J) s->now.J[a] = 1;
+    }
+    for (size_t a = 0; s->M && a < s->n; a++)
+        for (size_t i = 0; i < D * D; i++) s->M[D * D * a + i] = (tlsph_real)plan->correction[D * D * plan->host[a] + i];
+}
+
+/* M_a g, or g where there is no correction, in double; a is a host number. */
+static void tlsphi_apply_correction(const tlsphi_plan *plan, size_t a, const double *g, double out[3]) {
+    const size_t D = (size_t)plan->dim;
+    for (size_t i = 0; i < D; i++) {
+        out[i] = plan->correction ? 0 : g[i];
+        for (size_t k = 0; plan->correction && k < D; k++) out[i] += plan->correction[D * D * a + D * i + k] * g[k];
+    }
+}
+/* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
+static void tlsphi_sort_pairs(int dim, uint32_t *list, double *g, size_t count) {
+    for (size_t i = 1; i < count; i++) {
+        const uint32_t b = list[i];
+        double vector[3] = {0, 0, 0};
+        size_t j = i;
+        for (int k = 0; k < dim; k++) vector[k] = g[(size_t)dim * i + (size_t)k];
+        for (; j > 0 && list[j - 1] > b; j--) {
+            list[j] = list[j - 1];
+            for (int k = 0; k < dim; k++) g[(size_t)dim * j + (size_t)k] = g[(size_t)dim * (j - 1) + (size_t)k];
+        }
+        list[j] = b;
+        for (int k = 0; k < dim; k++) g[(size_t)dim * j + (size_t)k] = vector[k];
+    }
+}
+/* Pairs, boundary vectors B_a = -sum_b C_ab^skew and the time step's length tau_a = 2 dim V_a / sum_b |C_ab|. */
+static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = 0; a < s->n; a++) {
+        const uint32_t h = plan->host[a];
+        const size_t start = s->first[a], count = tlsphi_neighbours_of(plan, h, list, g);
+        double B[3] = {0, 0, 0}, sum = 0;
+        s->first[a + 1] = start + count;
+        for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
+        tlsphi_sort_pairs(s->dim, list, g, count);
+        for (size_t i = 0; i < count; i++) {
+            double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, square = 0;
+            tlsphi_apply_correction(plan, h, g + D * i, mine);
+            tlsphi_apply_correction(plan, plan->host[list[i]], g + D * i, other);
+            s->neighbour[start + i] = list[i];
+            for (size_t k = 0; k < D; k++) {
+                const double C = (mine[k] + other[k]) / 2;
+                s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
+                B[k] -= C;
+                square += mine[k] * mine[k];
+            }
+            sum += sqrt(square);
+        }
+        for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
+        s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum);
+    }
+}
+static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
+    const size_t D = (size_t)s->dim;
+    size_t at = 0;
+    for (size_t a = 0; s->fixes && a < s->n; a++) {
+        const uint32_t h = plan->host[a];
+        for (size_t k = 0; k < plan->fixed[h]; k++, at++) {
+            s->fix[at].particle = (uint32_t)a;
+            for (size_t i = 0; i < D; i++) s->fix[at].e[i] = (tlsph_real)plan->fixed_direction[D * D * h + D * k + i];
+        }
+    }
+}
+/* Mirrors sorted by particle, with a sentinel behind the last. */
+static void tlsphi_fill_mirrors(tlsph_solver *s, const tlsphi_plan *plan) {
+    if (!s->mirrors) return;
+    for (size_t a = 0; a < s->n; a++) s->mirror_of[a] = 0;
+    for (int pass = 0; pass < 2; pass++) { /* count, then place; mirror_of counts up to each particle's end and is walked back */
+        for (size_t k = 0; k < plan->desc->condition_count; k++) {
+            const tlsph_condition *c = plan->desc->conditions + k;
+            if (c->kind != TLSPH_ROLLER && c->kind != TLSPH_TANGENT) continue;
+            double N[3];
+            tlsphi_unit_normal(c, s->dim, N);
+            for (size_t i = 0; i < tlsphi_set_size(plan, c); i++) {
+                const uint32_t a = plan->inner[tlsphi_set_host(c, i)];
+                if (!pass) { s->mirror_of[a]++; continue; }
+                tlsphi_mirror *m = s->mirror + --s->mirror_of[a];
+                m->particle = a;
+                m->tangent = c->kind == TLSPH_TANGENT;
+                m->conducts = c->conducts;
+                for (int j = 0; j < 3; j++) m->N[j] = (tlsph_real)N[j];
+            }
+        }
+        for (size_t a = 1; !pass && a < s->n; a++) s->mirror_of[a] += s->mirror_of[a - 1];
+    }
+    s->mirror[s->mirrors].particle = TLSPHI_NONE;
+    for (size_t a = 0; a < s->n; a++)
+        if (s->mirror[s->mirror_of[a]].particle != a) s->mirror_of[a] = TLSPHI_NONE;
+}
+/* Reference area of a load on one particle: given, or from the operator's boundary vector. */
+static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, const tlsph_condition *c, size_t i) {
+    const size_t D = (size_t)s->dim, a = load->inner[i];
+    const tlsph_real *B = s->B + D * a, NN = tlsphi_dot(s->dim, c->normal, c->normal);
+    const tlsph_real along = NN > 0 ? tlsphi_dot(s->dim, B, c->normal) / tlsphi_sqrt(NN) : 0;
+    if (c->kind == TLSPH_PRESSURE) {
+        for (size_t k = 0; k < D; k++)
+            load->area[D * i + k] = c->areas ? c->areas[3 * i + k] : NN > 0 ? along * c->normal[k] / tlsphi_sqrt(NN) : B[k];
+        return;
+    }
+    load->area[i] = c->areas ? c->areas[i] : NN > 0 ? along : tlsphi_sqrt(tlsphi_dot(s->dim, B, B));
+}
+static void tlsphi_fill_loads(tlsph_solver *s, const tlsphi_plan *plan) {
+    size_t at = 0;
+    for (size_t k = 0; k < plan->desc->condition_count; k++) {
+        const tlsph_condition *c = plan->desc->conditions + k;
+        if (tlsphi_is_constraint(c->kind)) continue;
+        tlsphi_load *load = s->load + at++;
+        const int has_area = c->kind == TLSPH_TRACTION || c->kind == TLSPH_HEAT_FLUX || c->kind == TLSPH_PRESSURE;
+        for (size_t i = 0; i < load->given.count; i++) {
+            load->host[i] = tlsphi_set_host(c, i);
+            load->inner[i] = plan->inner[load->host[i]];
+            if (has_area) tlsphi_fill_area(s, load, c, i);
+        }
+        load->given.particles = NULL;
+        load->given.areas = NULL;
+        if (c->kind == TLSPH_WALL) {
+            double N[3];
+            tlsphi_unit_normal(c, s->dim, N);
+            for (int i = 0; i < 3; i++) load->given.normal[i] = (tlsph_real)N[i];
+        }
+    }
+}
+
+static uint64_t tlsphi_hash_reals(uint64_t h, const tlsph_real *x, size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        unsigned char bytes[8], *at = bytes;
+        tlsphi_put_real(&at, x[i]);
+        h = tlsphi_hash(h, bytes, (size_t)(at - bytes));
+    }
+    return h;
+}
+/* What a checkpoint must agree with: the layout of the state, the reference geometry and the materials. */
+static uint64_t tlsphi_fingerprint(const tlsph_solver *s) {
+    const unsigned char options[6] = {(unsigned char)s->dim, (unsigned char)s->thermal, (unsigned char)s->has_H, (unsigned char)s->has_J,
+                                      (unsigned char)s->coupling, (unsigned char)s->material_count};
+    uint64_t h = tlsphi_hash(0xcbf29ce484222325u, options, sizeof options);
+    for (size_t i = 0; i < s->n; i++) {
+        const size_t a = s->inner[i], D = (size_t)s->dim;
+        h = tlsphi_hash_reals(h, s->X + D * a, D);
+        h = tlsphi_hash_reals(h, s->V + a, 1);
+        if (s->material_of) h = tlsphi_hash(h, s->material_of + a, 1);
+    }
+    for (size_t i = 0; i < s->material_count; i++) {
+        const tlsphi_material *m = s->materials + i;
+        const tlsph_real constants[9] = {m->rho, m->c_v, m->theta_R, m->h, m->zeta, m->gamma, m->k, m->beta, m->q};
+        const unsigned char kind = (unsigned char)m->kind;
+        h = tlsphi_hash_reals(tlsphi_hash(h, &kind, 1), constants, 9);
+    }
+    return h;
+}
+
+/* Fills a solver whose arrays have their places. */
+static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
+    uint32_t *list = TLSPHI_SCRATCH(plan, uint32_t, plan->most);
+    double *g = TLSPHI_SCRATCH(plan, double, (size_t)plan->dim * plan->most);
+    if (!list || !g) return tlsphi_no_memory(plan, 32.0 * (double)plan->most);
+    for (size_t i = 0; i < s->material_count; i++) s->materials[i] = tlsphi_calibrate(plan->desc->materials + i);
+    tlsphi_fill_blocks(s, plan);
+    tlsphi_fill_particles(s, plan);
+    tlsphi_fill_pairs(s, plan, list, g);
+    tlsphi_fill_fixes(s, plan);
+    tlsphi_fill_mirrors(s, plan);
+    tlsphi_fill_loads(s, plan);
+    s->fingerprint = tlsphi_fingerprint(s);
+    tlsphi_no_error(&s->error);
+    for (size_t a = 0; s->thermal && a < s->n; a++) tlsphi_set_temperature(s, a, tlsphi_material_of(s, a)->theta_R);
+    tlsphi_stage start;
+    memset(&start, 0, sizeof start);
+    start.a = 1; /* the driven velocity replaces the old one, which is zero */
+    tlsphi_keep_state(s);
+    tlsphi_impose(s, &start, 0);
+    const tlsphi_block *bad = tlsphi_evaluate(s);
+    if (bad) {
+        const tlsph_result r = tlsphi_describe_failure(s, bad, "create");
+        if (plan->error) *plan->error = s->error;
+        return r;
+    }
+    tlsph_ledger_reset(s);
+    return TLSPH_OK;
+}
+
+/* Counts bytes into s->size; `s` may be a temporary. */
+static tlsph_result tlsphi_measure_plan(tlsph_solver *s, const tlsphi_plan *plan) {
+    tlsphi_arena arena;
+    memset(&arena, 0, sizeof arena);
+    memset(s, 0, sizeof *s);
+    tlsphi_copy_options(s, plan);
+    tlsphi_layout(s, &arena, plan);
+    if (!arena.overflow) return TLSPH_OK;
+    return tlsphi_fail(plan->error, TLSPH_ERROR_SIZE, "create", "bytes", TLSPH_NO_PARTICLE, (double)s->n, 0, "what an address can reach");
+}
+TLSPHI_DEF tlsph_result tlsph_measure(const tlsph_desc *desc, tlsph_size *size, tlsph_error *error) {
+    tlsphi_plan plan;
+    tlsph_solver s;
+    tlsph_result r = tlsphi_plan_make(&plan, desc, error);
+    if (!r) r = tlsphi_measure_plan(&s, &plan);
+    if (!r && size) *size = s.size;
+    tlsphi_plan_release(&plan);
+    return r;
+}
+
+/* The solver's block: the caller's, or one from the allocator. */
+static tlsph_result tlsphi_take_block(tlsphi_plan *plan, const tlsph_size *size, tlsphi_arena *arena) {
+    const tlsph_desc *d = plan->desc;
+    memset(arena, 0, sizeof *arena);
+    arena->size = size->bytes;
+    if (d->memory && (d->memory_size < size->bytes || ((uintptr_t)d->memory & 63)))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "memory_size", TLSPH_NO_PARTICLE, (double)d->memory_size, (double)size->bytes,
+                                "tlsph_measure's bytes or more, aligned to 64 bytes");
+    arena->memory = (unsigned char *)(d->memory ? d->memory : plan->allocator.allocate(plan->allocator.user, size->bytes + 64));
+    return arena->memory ? TLSPH_OK : tlsphi_no_memory(plan, (double)size->bytes);
+}
+static tlsph_result tlsphi_create_planned(tlsphi_plan *plan, tlsph_solver **out) {
+    tlsph_solver draft, *s;
+    tlsphi_arena arena;
+    tlsph_result r = tlsphi_measure_plan(&draft, plan);
+    if (r || (r = tlsphi_take_block(plan, &draft.size, &arena))) return r;
+    unsigned char *const block = arena.memory;
+    const size_t size = draft.size.bytes;
+    if (!plan->desc->memory) arena.memory += 64 - ((uintptr_t)block & 63); /* line up with cache lines */
+    memset(arena.memory, 0, size);
+    s = (tlsph_solver *)(void *)arena.memory;
+    memset(&draft, 0, sizeof draft);
+    tlsphi_copy_options(&draft, plan);
+    *s = draft;
+    tlsphi_layout(s, &arena, plan);
+    s->allocator = plan->allocator;
+    s->memory = block;
+    s->memory_size = size + 64;
+    s->owns_memory = !plan->desc->memory;
+    r = tlsphi_fill_solver(s, plan);
+    if (r) tlsph_destroy(s);
+    else *out = s;
+    return r;
+}
+TLSPHI_DEF tlsph_result tlsph_create(const tlsph_desc *desc, tlsph_solver **solver, tlsph_error *error) {
+    tlsphi_plan plan;
+    if (!solver) {
+        tlsphi_no_error(error);
+        return tlsphi_fail(error, TLSPH_ERROR_ARGUMENT, "create", "solver", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
+    }
+    *solver = NULL;
+    tlsph_result r = tlsphi_plan_make(&plan, desc, error);
+    if (!r) r = tlsphi_create_planned(&plan, solver);
+    tlsphi_plan_release(&plan);
+    return r;
+}
+TLSPHI_DEF void tlsph_destroy(tlsph_solver *s) {
+    if (!s || !s->owns_memory) return;
+    const tlsph_allocator allocator = s->allocator;
+    allocator.release(allocator.user, s->memory, s->memory_size);
+}
+
+/* -- default descriptions -- */
+
+TLSPHI_DEF tlsph_desc tlsph_desc_default(int dimension) {
+    tlsph_desc d;
+    memset(&d, 0, sizeof d);
+    d.cookie = TLSPHI_COOKIE;
+    d.dimension = dimension;
+    d.kernel = TLSPH_QUADRATIC;
+    d.support = TLSPHI_R(0.6);
+    d.drift_stiffness = 1;
+    d.drift_scale = TLSPHI_R(0.03);
+    d.jump_share = TLSPHI_R(0.5);
+    d.mirror_gradients = 1;
+    d.dissipation_heats = 1;
+    d.projection = 1;
+    d.cfl = TLSPHI_R(0.3);
+    return d;
+}
+TLSPHI_DEF tlsph_material tlsph_material_default(tlsph_material_kind kind) {
+    tlsph_material m;
+    memset(&m, 0, sizeof m);
+    m.kind = kind;
+    m.reference_temperature = TLSPHI_R(293.15);
+    m.gruneisen_exponent = 1;
+    return m;
+}
+TLSPHI_DEF tlsph_condition tlsph_condition_default(tlsph_condition_kind kind) {
+    tlsph_condition c;
+    memset(&c, 0, sizeof c);
+    c.cookie = TLSPHI_COOKIE;
+    c.kind = kind;
+    return c;
+}
+
+/* ==== [FILL] =======================================================================================================
+   A lattice of cells over the shape's box. A cell belongs to the body if its centre does. On-face particles sit at the
+   corners of cells with an eighth (2-D: a quarter) of each cell around them; cell-centred ones in the middle. The lines of
+   the lattice are spaced per segment, so that the notch of an L lies on a line. */
+
+#define TLSPHI_LINES 4096 /* at most, per axis */
+
+typedef struct tlsphi_lattice {
+    const tlsph_fill *fill;
+    tlsph_allocator allocator;
+    size_t cells[3], lines[3];      /* per axis */
+    double *line[3];                /* coordinates */
+    unsigned char *inside;          /* per cell */
+    uint32_t *number;               /* per corner or cell: particle, or TLSPHI_NONE */
+    size_t particles, body_cells;
+    void *memory; size_t memory_size;
+} tlsphi_lattice;
+
+static int tlsphi_inside(const tlsph_fill *f, const double X[3]) {
+    double r2 = 0, least = 1e300;
+    tlsph_real at[3];
+    for (int i = 0; i < 3; i++) at[i] = (tlsph_real)X[i];
+    switch (f->shape) {
+    case TLSPH_L_SHAPE: return !(X[0] > (double)f->origin[0] + (double)f->notch[0] && X[1] > (double)f->origin[1] + (double)f->notch[1]);
+    case TLSPH_PREDICATE: return f->inside(f->inside_user, at);
+    case TLSPH_CYLINDER: case TLSPH_SPHERE:
+        for (int i = 0; i < f->dimension; i++) {
+            const double half = (double)f->size[i] / 2, d = X[i] - (double)f->origin[i] - half;
+            if (f->shape == TLSPH_CYLINDER && f->dimension == 3 && i == f->axis) continue;
+            r2 += d * d;
+            least = tlsphi_dmin(least, half);
+        }
+        return r2 <= least * least && r2 >= (double)f->inner_radius * (double)f->inner_radius;
+    default: return 1;
+    }
+}
+/* Writes the lines of one segment [low, low + length], returns how many cells it has. */
+static size_t tlsphi_segment(double *line, double low, double length, double spacing) {
+    double rounded = floor(length / spacing + 0.5);
+    if (rounded < 1) rounded = 1;
+    const size_t cells = (size_t)rounded;
+    for (size_t i = 0; line && i <= cells; i++) line[i] = low + length * ((double)i / (double)cells);
+    return cells;
+}
+static size_t tlsphi_axis_lines(const tlsph_fill *f, int axis, double *line) {
+    const double low = (double)f->origin[axis], length = (double)f->size[axis], spacing = (double)f->spacing;
+    if (f->shape != TLSPH_L_SHAPE || axis == 2) return tlsphi_segment(line, low, length, spacing);
+    const double notch = (double)f->notch[axis];
+    const size_t first = tlsphi_segment(line, low, notch, spacing);
+    return first + tlsphi_segment(line ? line + first : NULL, low + notch, length - notch, spacing);
+}
+
+static size_t tlsphi_cell_index(const tlsphi_lattice *l, const size_t c[3]) { return (c[2] * l->cells[1] + c[1]) * l->cells[0] + c[0]; }
+static size_t tlsphi_line_index(const tlsphi_lattice *l, const size_t c[3]) { return (c[2] * l->lines[1] + c[1]) * l->lines[0] + c[0]; }
+static double tlsphi_lattice_cell(const tlsphi_lattice *l, const size_t c[3], double centre[3]) {
+    double volume = 1;
+    centre[2] = 0;
+    for (int i = 0; i < l->fill->dimension; i++) {
+        const double low = l->line[i][c[i]], high = l->line[i][c[i] + 1];
+        centre[i] = (low + high) / 2;
+        volume *= high - low;
+    }
+    return volume;
+}
+/* Calls visit for every cell of the body (or of the box, while `inside` is being found). */
+typedef void (*tlsphi_cell_fn)(tlsphi_lattice *l, const size_t c[3], void *arg);
+static void tlsphi_each_cell(tlsphi_lattice *l, int all, tlsphi_cell_fn visit, void *arg) {
+    size_t c[3];
+    for (c[2] = 0; c[2] < l->cells[2]; c[2]++)
+        for (c[1] = 0; c[1] < l->cells[1]; c[1]++)
+            for (c[0] = 0; c[0] < l->cells[0]; c[0]++)
+                if (all || l->inside[tlsphi_cell_index(l, c)]) visit(l, c, arg);
+}
+static void tlsphi_test_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
+    double centre[3];
+    (void)arg;
+    tlsphi_lattice_cell(l, c, centre);
+    const int in = tlsphi_inside(l->fill, centre) != 0;
+    l->inside[tlsphi_cell_index(l, c)] = (unsigned char)in;
+    l->body_cells += (size_t)in;
+}
+/* Lattice line of corner k of a cell. */
+static size_t tlsphi_corner(const tlsphi_lattice *l, const size_t c[3], int k) {
+    size_t at[3];
+    for (int i = 0; i < 3; i++) at[i] = c[i] + (size_t)(i < l->fill->dimension ? k >> i & 1 : 0);
+    return tlsphi_line_index(l, at);
+}
+static void tlsphi_mark_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
+    (void)arg;
+    if (l->fill->placement == TLSPH_CELL_CENTRED) l->number[tlsphi_cell_index(l, c)] = 0;
+    else for (int k = 0; k < 1 << l->fill->dimension; k++) l->number[tlsphi_corner(l, c, k)] = 0;
+}
+static void tlsphi_number_particles(tlsphi_lattice *l, size_t places) {
+    for (size_t i = 0; i < places; i++) l->number[i] = TLSPHI_NONE;
+    tlsphi_each_cell(l, 0, tlsphi_mark_cell, NULL);
+    for (size_t i = 0; i < places; i++)
+        if (l->number[i] != TLSPHI_NONE) l->number[i] = (uint32_t)l->particles++;
+}
+
+typedef struct tlsphi_fill_target { tlsph_real *X, *V, *w, *share; uint32_t *cells; size_t cell; } tlsphi_fill_target;
+
+static void tlsphi_fill_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
+    tlsphi_fill_target *t = (tlsphi_fill_target *)arg;
+    double centre[3];
+    const double volume = tlsphi_lattice_cell(l, c, centre);
+    if (l->fill->placement == TLSPH_CELL_CENTRED) {
+        const uint32_t a = l->number[tlsphi_cell_index(l, c)];
+        for (int i = 0; i < 3; i++) t->X[3 * a + (uint32_t)i] = (tlsph_real)centre[i];
+        t->V[a] = t->w[a] = (tlsph_real)volume;
+        return;
+    }
+    const int corners = 1 << l->fill->dimension;
+    for (int k = 0; k < corners; k++) {
+        const uint32_t a = l->number[tlsphi_corner(l, c, k)];
+        for (int i = 0; i < 3; i++)
+            t->X[3 * a + (uint32_t)i] = i < l->fill->dimension ? (tlsph_real)l->line[i][c[i] + (size_t)(k >> i & 1)] : 0;
+        t->V[a] += (tlsph_real)(volume / corners);
+        t->w[a] += (tlsph_real)volume; /* becomes the mean volume of the cells around a particle */
+        t->share[a] += 1;
+        t->cells[((size_t)corners) * t->cell + (size_t)k] = a;
+    }
+    t->cell++;
+}
+
+/* splitmix64: the same jitter everywhere for the same seed. */
+static double tlsphi_random(uint64_t *state) {
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return (double)((z ^ z >> 31) >> 11) / 9007199254740992.0;
+}
+/* Moves each coordinate by up to jitter x spacing; on-face particles only along axes in which cells lie on both sides. */
+static void tlsphi_jitter(const tlsphi_lattice *l, tlsph_real *X, const tlsph_real *share) {
+    const tlsph_fill *f = l->fill;
+    uint64_t state = f->seed;
+    for (size_t a = 0; a < l->particles; a++)
+        for (int i = 0; i < f->dimension; i++) {
+            const double move = (2 * tlsphi_random(&state) - 1) * (double)f->jitter * (double)f->spacing;
+            const double low = l->line[i][0], high = l->line[i][l->cells[i]], x = (double)X[3 * a + (size_t)i];
+            const int interior = share ? share[a] == (tlsph_real)(1 << f->dimension) : 1;
+            const int on_box = x <= low || x >= high;
+            if (f->placement == TLSPH_CELL_CENTRED || interior || (f->shape == TLSPH_BOX && !on_box))
+                X[3 * a + (size_t)i] = (tlsph_real)(x + move);
+        }
+}
+
+static tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const char *field, double value, const char *allowed) {
+    return tlsphi_fail(error, r, "fill", field, TLSPH_NO_PARTICLE, value, 0, allowed);
+}
+static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
+    if (f->cookie != TLSPHI_COOKIE || f->dimension < 2 || f->dimension > 3 || (unsigned)f->shape > (unsigned)TLSPH_PREDICATE ||
+        (unsigned)f->placement > (unsigned)TLSPH_CELL_CENTRED || (f->shape == TLSPH_PREDICATE && !f->inside) || f->axis < 0 || f->axis > 2)
+        return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "cookie, dimension, shape, placement, axis or inside", f->dimension, "what tlsph_fill_default sets");
+    if (!tlsphi_all_finite(f->origin, 3) || !tlsphi_all_finite(f->size, 3) || !tlsphi_finite(f->spacing))
+        return tlsphi_fill_fail(error, TLSPH_ERROR_NOT_FINITE, "origin, size or spacing", (double)f->spacing, "finite");
+    for (int i = 0; i < f->dimension; i++) {
+        if (!(f->size[i] > 0)) return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "size", (double)f->size[i], "more than 0");
+        if (!(f->spacing > 0) || !((double)f->size[i] / (double)f->spacing < TLSPHI_LINES - 2))
+            return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "spacing", (double)f->spacing, "more than 0, fewer than 4094 cells an axis");
+        if (f->shape == TLSPH_L_SHAPE && i < 2 && !(f->notch[i] > 0 && f->notch[i] < f->size[i]))
+            return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "notch", (double)f->notch[i], "between 0 and size");
+    }
+    if (!(f->jitter >= 0) || !(f->jitter <= TLSPHI_R(0.45)))
+        return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "jitter", (double)f->jitter, "0 to 0.45");
+    return f->inner_radius >= 0 ? TLSPH_OK : tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "inner_radius", (double)f->inner_radius, "0 or more");
+}
+/* Lines, inside flags and numbers in one scratch block. */
+static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
+    tlsphi_arena arena;
+    size_t cells = 1, lines = 1;
+    for (int i = 0; i < 3; i++) {
+        l->cells[i] = i < l->fill->dimension ? tlsphi_axis_lines(l->fill, i, NULL) : 1;
+        l->lines[i] = i < l->fill->dimension ? l->cells[i] + 1 : 1;
+        cells *= l->cells[i];
+        lines *= l->lines[i];
+    }
+    memset(&arena, 0, sizeof arena);
+    for (int pass = 0; pass < 2; pass++) {
+        arena.used = 0;
+        for (int i = 0; i < 3; i++) l->line[i] = TLSPHI_TAKE(&arena, double, l->lines[i] + 1);
+        l->inside = TLSPHI_TAKE(&arena, unsigned char, cells);
+        l->number = TLSPHI_TAKE(&arena, uint32_t, lines);
+        if (pass) break;
+        l->memory_size = arena.size = arena.used;
+        l->memory = lines < 4294967295u ? l->allocator.allocate(l->allocator.user, l->memory_size) : NULL;
+        if (!l->memory) return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)l->memory_size, "what the allocator can give");
+        arena.memory = (unsigned char *)l->memory;
+    }
+    for (int i = 0; i < l->fill->dimension; i++) tlsphi_axis_lines(l->fill, i, l->line[i]);
+    tlsphi_each_cell(l, 1, tlsphi_test_cell, NULL);
+    tlsphi_number_particles(l, l->fill->placement == TLSPH_CELL_CENTRED ? cells : lines);
+    return l->particles ? TLSPH_OK : tlsphi_fill_fail(error, TLSPH_ERROR_SIZE, "particles", 0, "at least 1; refine the spacing");
+}
+static tlsph_result tlsphi_cloud_fill(tlsphi_lattice *l, tlsph_cloud *cloud, tlsph_error *error) {
+    tlsphi_arena arena;
+    tlsphi_fill_target t;
+    const int on_faces = l->fill->placement == TLSPH_ON_FACES;
+    const size_t n = l->particles, corners = on_faces ? l->body_cells << l->fill->dimension : 0;
+    memset(&arena, 0, sizeof arena);
+    memset(&t, 0, sizeof t);
+    for (int pass = 0; pass < 2; pass++) {
+        arena.used = 0;
+        t.X = TLSPHI_TAKE(&arena, tlsph_real, 3 * n);
+        t.V = TLSPHI_TAKE(&arena, tlsph_real, n);
+        t.w = TLSPHI_TAKE(&arena, tlsph_real, n);
+        t.share = TLSPHI_TAKE(&arena, tlsph_real, n);
+        t.cells = TLSPHI_TAKE(&arena, uint32_t, corners);
+        if (pass) break;
+        cloud->memory_size = arena.size = arena.used;
+        cloud->memory = l->allocator.allocate(l->allocator.user, cloud->memory_size);
+        if (!cloud->memory) return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)cloud->memory_size, "what the allocator can give");
+        arena.memory = (unsigned char *)cloud->memory;
+        memset(cloud->memory, 0, cloud->memory_size);
+    }
+    tlsphi_each_cell(l, 0, tlsphi_fill_cell, &t);
+    for (size_t a = 0; on_faces && a < n; a++) t.w[a] /= t.share[a];
+    if (l->fill->jitter > 0) tlsphi_jitter(l, t.X, on_faces ? t.share : NULL);
+    cloud->particles.count = n;
+    cloud->particles.positions = t.X;
+    cloud->particles.volumes = t.V;
+    cloud->particles.weights = t.w;
+    cloud->particles.cells = on_faces && !(l->fill->jitter > 0) ? t.cells : NULL;
+    cloud->particles.cell_count = cloud->particles.cells ? l->body_cells : 0;
+    cloud->allocator = l->allocator;
+    double mean = 1;
+    for (int i = 0; i < l->fill->dimension; i++) {
+        const double edge = (l->line[i][l->cells[i]] - l->line[i][0]) / (double)l->cells[i];
+        cloud->cell_size[i] = (tlsph_real)edge;
+        mean = i ? tlsphi_dmax(mean, edge) : edge;
+    }
+    cloud->particles.spacing = (tlsph_real)mean; /* the largest, as the papers take it */
+    return TLSPH_OK;
+}
+TLSPHI_DEF tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *cloud, tlsph_error *error) {
+    tlsphi_lattice l;
+    tlsphi_no_error(error);
+    if (cloud) memset(cloud, 0, sizeof *cloud);
+    if (!fill || !cloud) return tlsphi_fill_fail(error, TLSPH_ERROR_ARGUMENT, "fill or cloud", 0, "not NULL");
+    tlsph_result r = tlsphi_check_fill(fill, error);
+    if (r) return r;
+    memset(&l, 0, sizeof l);
+    l.fill = fill;
+    l.allocator = tlsphi_allocator(&fill->allocator);
+    r = tlsphi_lattice_make(&l, error);
+    if (!r) r = tlsphi_cloud_fill(&l, cloud, error);
+    if (l.memory) l.allocator.release(l.allocator.user, l.memory, l.memory_size);
+    return r;
+}
+TLSPHI_DEF void tlsph_cloud_destroy(tlsph_cloud *cloud) {
+    if (!cloud) return;
+    if (cloud->memory) cloud->allocator.release(cloud->allocator.user, cloud->memory, cloud->memory_size);
+    memset(cloud, 0, sizeof *cloud);
+}
+TLSPHI_DEF tlsph_fill tlsph_fill_default(int dimension) {
+    tlsph_fill f;
+    memset(&f, 0, sizeof f);
+    f.cookie = TLSPHI_COOKIE;
+    f.dimension = dimension;
+    f.axis = 2;
+    return f;
+}
+TLSPHI_DEF size_t tlsph_select(const tlsph_particles *particles, tlsph_inside_fn inside, void *user, uint32_t *out, size_t capacity) {
+    size_t found = 0;
+    for (size_t a = 0; a < particles->count; a++) {
+        if (!inside(user, particles->positions + 3 * a)) continue;
+        if (found < capacity) out[found] = (uint32_t)a;
+        found++;
+    }
+    return found;
+}
+typedef struct tlsphi_plane { int axis; tlsph_real value, tolerance; } tlsphi_plane;
+static int tlsphi_in_plane(void *user, const tlsph_real *X) {
+    const tlsphi_plane *plane = (const tlsphi_plane *)user;
+    return tlsphi_abs(X[plane->axis] - plane->value) <= plane->tolerance;
+}
+TLSPHI_DEF size_t tlsph_select_plane(const tlsph_particles *particles, int axis, tlsph_real value, tlsph_real tolerance,
+                                     uint32_t *out, size_t capacity) {
+    tlsphi_plane plane;
+    plane.axis = axis;
+    plane.value = value;
+    plane.tolerance = tolerance;
+    return tlsph_select(particles, tlsphi_in_plane, &plane, out, capacity);
+}
+
+#endif /* TLSPH_IMPLEMENTATION_DONE */
+#endif /* TLSPH_IMPLEMENTATION */
+
+/* ==== [LICENCE] ====================================================================================================
+   You may choose: public domain (www.unlicense.org), or MIT:
+
+   Copyright (c) 2026 the authors of tlsph.h
+   Permission is hereby granted, free of charge, to any person obtaining a copy of this software and associated
+   documentation files (the "Software"), to deal in the Software without restriction, including without limitation the
+   rights to use, copy, modify, merge, publish, distribute, sublicense, and/or sell copies of the Software, and to permit
+   persons to whom the Software is furnished to do so, subject to the following conditions: The above copyright notice and
+   this permission notice shall be included in all copies or substantial portions of the Software. THE SOFTWARE IS PROVIDED
+   "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES OF
+   MERCHANTABILITY, FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT HOLDERS
+   BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+   OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
+
+   HISTORY
+   0.1  the core: container, corrected-kernel and cell operators, {p,F} to {p,F,H,J,E}, four materials and the user's own,
+        limited dissipation, two-stage Runge-Kutta step, conditions, ledger, checkpoints, lattice fillers. */
