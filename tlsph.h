@@ -71,7 +71,11 @@ INDEX (search for the tag)
 #define TLSPH_VERSION_MINOR 1
 
 #ifdef TLSPH_STATIC
+#if defined(__GNUC__) || defined(__clang__)
+#define TLSPH_API static __attribute__((unused))
+#else
 #define TLSPH_API static
+#endif
 #else
 #define TLSPH_API extern
 #endif
@@ -321,7 +325,7 @@ typedef struct tlsph_desc {
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
     tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP if enabled, else serial */
     tlsph_allocator allocator;           /* zero: TLSPH_MALLOC and TLSPH_FREE */
-    void *memory;                        size_t memory_size;      /* caller's block for the solver (tlsph_measure), or NULL */
+    void *memory;                        size_t memory_size;      /* caller's block for the solver, of any alignment (tlsph_measure), or NULL */
 } tlsph_desc;
 
 /* What a solver of a description needs (see tlsph_measure). */
@@ -387,7 +391,7 @@ typedef struct tlsph_ledger {
     X(TLSPH_FIELD_HELMHOLTZ_ENERGY, "helmholtz_energy", "J/m^3", 1, 0)                                                 \
     X(TLSPH_FIELD_P_WAVE_SPEED, "p_wave_speed", "m/s", 1, 0)                                                           \
     X(TLSPH_FIELD_S_WAVE_SPEED, "s_wave_speed", "m/s", 1, 0)                                                           \
-    X(TLSPH_FIELD_VELOCITY_GRADIENT, "velocity_gradient", "1/s", 9, 0) /* of the last stage, by X */                   \
+    X(TLSPH_FIELD_VELOCITY_GRADIENT, "velocity_gradient", "1/s", 9, 0) /* of the last stage, by X; not part of the state */                   \
     X(TLSPH_FIELD_VOLUME, "volume", "m^3", 1, 0)                                                                       \
     X(TLSPH_FIELD_MASS, "mass", "kg", 1, 0)                                                                            \
     X(TLSPH_FIELD_BOUNDARY_AREA, "boundary_area", "m^2", 3, 0)   /* B_a = -sum_b C_ab^skew, outward */                 \
@@ -475,7 +479,8 @@ TLSPH_API tlsph_material tlsph_material_default(tlsph_material_kind kind);
 TLSPH_API tlsph_condition tlsph_condition_default(tlsph_condition_kind kind);
 TLSPH_API tlsph_fill tlsph_fill_default(int dimension);
 
-/* Fills a shape with particles. ERROR_DESCRIPTION, ERROR_ARGUMENT, ERROR_SIZE, ERROR_MEMORY; then *cloud is empty. */
+/* Fills a shape with particles. ERROR_DESCRIPTION, ERROR_ARGUMENT, ERROR_NOT_FINITE, ERROR_SIZE, ERROR_MEMORY; then
+   *cloud is empty. */
 TLSPH_API tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *cloud, tlsph_error *error);
 TLSPH_API void tlsph_cloud_destroy(tlsph_cloud *cloud);
 /* Numbers of all particles with |X[axis] - value| <= tolerance (m). Writes at most `capacity`, returns how many there are. */
@@ -677,6 +682,10 @@ TLSPHI_INLINE int tlsphi_finite(tlsph_real x) {
     memcpy(&bits, &x, sizeof bits);
     return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
 #endif
+}
+TLSPHI_INLINE int tlsphi_nan(tlsph_real x) { /* not finite, and not equal to infinity's bits */
+    const tlsph_real infinity = (tlsph_real)HUGE_VAL, minus = -infinity;
+    return !tlsphi_finite(x) && memcmp(&x, &infinity, sizeof x) != 0 && memcmp(&x, &minus, sizeof x) != 0;
 }
 static int tlsphi_all_finite(const tlsph_real *x, size_t n) {
     for (size_t i = 0; i < n; i++) if (!tlsphi_finite(x[i])) return 0;
@@ -1888,7 +1897,7 @@ static void tlsphi_user_responses(const tlsph_solver *s, size_t begin, size_t en
    fixed face the normal velocity is even: G -= N N (G N) (x) N. Both are orthogonal projections; used on P as well they
    keep force and gradient adjoint, so that no energy is lost. */
 static void tlsphi_mirror_tensor(int dim, const tlsphi_mirror *mirror, tlsph_real *G) {
-    tlsph_real GN[3];
+    tlsph_real GN[3] = {0, 0, 0};
     tlsphi_multiply(dim, G, mirror->N, GN);
     const tlsph_real normal = tlsphi_dot(dim, GN, mirror->N);
     for (int i = 0; i < dim; i++) GN[i] = mirror->tangent ? -normal * mirror->N[i] : normal * mirror->N[i] - GN[i];
@@ -2280,7 +2289,8 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
             tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
             tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, TLSPH_LIMITED, sum, &production);
         } else if (s->dissipation != TLSPH_NO_DISSIPATION) {
-            const tlsphi_gathered before = *sum;
+            tlsphi_gathered before;
+            if (s->audit) before = *sum;
             tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
             if (s->dissipation == TLSPH_AS_PRINTED) tlsphi_pair_printed(s, a, b, C, c, sum, &production);
             else tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, (int)s->dissipation, sum, &production);
@@ -2334,28 +2344,33 @@ TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const
         tlsphi_flux_store(s, a, &sum, block->sums);
     }
 }
-#define TLSPHI_FLUX(name, dim, with_J, thermal, plain) \
-    static void name(tlsph_solver *s, tlsphi_block *b) { tlsphi_flux_range(s, b, dim, with_J, thermal, plain); }
-#define TLSPHI_FLUXES(dim, plain)                                                                                        \
-    TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_0_0, dim, 0, 0, plain) TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_0_1, dim, 0, 1, plain) \
-    TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_0_2, dim, 0, 2, plain) TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_1_0, dim, 1, 0, plain) \
-    TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_1_1, dim, 1, 1, plain) TLSPHI_FLUX(tlsphi_flux_##dim##_p##plain##_1_2, dim, 1, 2, plain)
-TLSPHI_FLUXES(2, 0)
-TLSPHI_FLUXES(2, 1)
-TLSPHI_FLUXES(3, 0)
-TLSPHI_FLUXES(3, 1)
-#define TLSPHI_FLUX_ROW(dim, plain)                                                                        \
-    {{tlsphi_flux_##dim##_p##plain##_0_0, tlsphi_flux_##dim##_p##plain##_0_1, tlsphi_flux_##dim##_p##plain##_0_2}, \
-     {tlsphi_flux_##dim##_p##plain##_1_0, tlsphi_flux_##dim##_p##plain##_1_1, tlsphi_flux_##dim##_p##plain##_1_2}}
+#define TLSPHI_FLUX(dim, J, thermal) \
+    static void tlsphi_flux_##dim##J##thermal(tlsph_solver *s, tlsphi_block *b) { tlsphi_flux_range(s, b, dim, J, thermal, 1); }
+TLSPHI_FLUX(2, 0, 0) TLSPHI_FLUX(2, 0, 1) TLSPHI_FLUX(2, 0, 2) TLSPHI_FLUX(2, 1, 0) TLSPHI_FLUX(2, 1, 1) TLSPHI_FLUX(2, 1, 2)
+TLSPHI_FLUX(3, 0, 0) TLSPHI_FLUX(3, 0, 1) TLSPHI_FLUX(3, 0, 2) TLSPHI_FLUX(3, 1, 0) TLSPHI_FLUX(3, 1, 1) TLSPHI_FLUX(3, 1, 2)
 
+/* All else: other dissipations, corrected kernels, audit. */
+static void tlsphi_flux_any(tlsph_solver *s, tlsphi_block *block) {
+    if (s->dim == 3) tlsphi_flux_range(s, block, 3, s->has_J, s->thermal, 0);
+    else tlsphi_flux_range(s, block, 2, s->has_J, s->thermal, 0);
+}
 static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
-    static const tlsphi_block_fn instances[2][2][2][3] = {
-        {TLSPHI_FLUX_ROW(2, 0), TLSPHI_FLUX_ROW(2, 1)},
-        {TLSPHI_FLUX_ROW(3, 0), TLSPHI_FLUX_ROW(3, 1)},
-    };
-    const int plain = s->dissipation == TLSPH_LIMITED && !s->M && !s->audit;
     for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
-    instances[s->dim == 3][plain][s->has_J][s->thermal](s, block);
+    if (s->dissipation != TLSPH_LIMITED || s->M || s->audit) { tlsphi_flux_any(s, block); return; }
+    switch ((s->dim == 3 ? 6 : 0) + (s->has_J ? 3 : 0) + s->thermal) {
+    case 0: tlsphi_flux_200(s, block); break;
+    case 1: tlsphi_flux_201(s, block); break;
+    case 2: tlsphi_flux_202(s, block); break;
+    case 3: tlsphi_flux_210(s, block); break;
+    case 4: tlsphi_flux_211(s, block); break;
+    case 5: tlsphi_flux_212(s, block); break;
+    case 6: tlsphi_flux_300(s, block); break;
+    case 7: tlsphi_flux_301(s, block); break;
+    case 8: tlsphi_flux_302(s, block); break;
+    case 9: tlsphi_flux_310(s, block); break;
+    case 10: tlsphi_flux_311(s, block); break;
+    default: tlsphi_flux_312(s, block); break;
+    }
 }
 
 /* ==== [CONDITIONS] =================================================================================================
@@ -2580,12 +2595,18 @@ static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt)
 
 typedef struct tlsphi_projection { tlsph_solver *s; tlsphi_stage stage; double dt; } tlsphi_projection;
 
-/* Position of particle a at this stage, seen from the first particle of its body (for the sake of round-off). */
-static void tlsphi_projection_arm(const tlsphi_projection *p, uint32_t body, size_t a, double X[3]) {
-    double origin[3];
-    tlsphi_stage_position(p->s, &p->stage, p->dt, p->s->body[body].first, origin);
+/* Positions of this stage are seen from the first particle of the body, for the sake of round-off. */
+static void tlsphi_projection_origin(const tlsphi_projection *p, const tlsphi_block *block, double origin[3]) {
+    tlsphi_stage_position(p->s, &p->stage, p->dt, p->s->body[block->body].first, origin);
+}
+static void tlsphi_projection_arm(const tlsphi_projection *p, const double origin[3], size_t a, double X[3]) {
     tlsphi_stage_position(p->s, &p->stage, p->dt, a, X);
     for (int i = 0; i < 3; i++) X[i] -= origin[i];
+}
+/* The same, seen from the centre of the body. */
+static void tlsphi_projection_centre(const tlsphi_projection *p, const tlsphi_block *block, double centre[3]) {
+    tlsphi_projection_origin(p, block, centre);
+    for (int i = 0; i < 3; i++) centre[i] += p->s->body[block->body].centre[i];
 }
 static void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
     out[2] = 0;
@@ -2597,11 +2618,12 @@ static void tlsphi_rigid_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
     const tlsph_solver *s = p->s;
     tlsphi_block *block = p->s->block + i;
-    double *m = block->moments, X[3], v[3], Xv[3];
+    double *m = block->moments, origin[3], X[3], v[3], Xv[3];
     memset(block->moments, 0, sizeof block->moments);
+    tlsphi_projection_origin(p, block, origin);
     for (size_t a = block->begin; a < block->end; a++) {
         const double V = (double)s->V[a];
-        tlsphi_projection_arm(p, block->body, a, X);
+        tlsphi_projection_arm(p, origin, a, X);
         tlsphi_vector3(s->v + (size_t)s->dim * a, s->dim, v);
         tlsphi_cross3(X, v, Xv);
         m[0] += V;
@@ -2619,10 +2641,11 @@ static void tlsphi_torque_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
     const tlsph_solver *s = p->s;
     tlsphi_block *block = p->s->block + i;
-    double *m = block->moments, X[3], T[3], XT[3];
+    double *m = block->moments, origin[3], X[3], T[3], XT[3];
     memset(block->moments, 0, sizeof block->moments);
+    tlsphi_projection_origin(p, block, origin);
     for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_projection_arm(p, block->body, a, X);
+        tlsphi_projection_arm(p, origin, a, X);
         tlsphi_vector3(s->rate_p + (size_t)s->dim * a, s->dim, T);
         tlsphi_cross3(X, T, XT);
         for (int k = 0; k < 3; k++) {
@@ -2664,10 +2687,10 @@ static void tlsphi_relative_task(void *arg, size_t i) {
     const tlsphi_block *block = s->block + i;
     const tlsphi_body *body = s->body + block->body;
     const size_t D = (size_t)s->dim;
-    double X[3], turn[3];
+    double centre[3], X[3], turn[3];
+    tlsphi_projection_centre(p, block, centre);
     for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_projection_arm(p, block->body, a, X);
-        for (int k = 0; k < 3; k++) X[k] -= body->centre[k];
+        tlsphi_projection_arm(p, centre, a, X);
         tlsphi_cross3(body->spin, X, turn);
         for (size_t k = 0; k < D; k++) s->w[D * a + k] = (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
     }
@@ -2678,10 +2701,10 @@ static void tlsphi_correct_task(void *arg, size_t i) {
     const tlsphi_block *block = s->block + i;
     const tlsphi_body *body = s->body + block->body;
     const size_t D = (size_t)s->dim;
-    double X[3], turn[3];
+    double centre[3], X[3], turn[3];
+    tlsphi_projection_centre(p, block, centre);
     for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_projection_arm(p, block->body, a, X);
-        for (int k = 0; k < 3; k++) X[k] -= body->centre[k];
+        tlsphi_projection_arm(p, centre, a, X);
         tlsphi_cross3(body->lambda, X, turn);
         for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += (tlsph_real)(turn[k] + body->linear[k]);
     }
@@ -2863,8 +2886,9 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
 TLSPHI_DEF tlsph_result tlsph_step(tlsph_solver *s, tlsph_real dt_limit) {
     const double stable = (double)tlsph_stable_time_step(s);                    /* (2), (3) */
     const double dt = (double)dt_limit < stable ? (double)dt_limit : stable;
-    if (!(dt > 0) || !(dt < 1e290))
-        return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "dt", TLSPH_NO_PARTICLE, dt, 0, "more than 0, finite");
+    if (tlsphi_nan(dt_limit) || !tlsphi_finite((tlsph_real)dt) || !(dt > 0) || !(dt < 1e290))
+        return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "dt", TLSPH_NO_PARTICLE, (double)dt_limit, 0,
+                           "more than 0; infinite only with a finite wave speed");
     if (s->first_dt > 0 && stable < 1e-9 * s->first_dt)
         return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "stable dt", TLSPH_NO_PARTICLE, stable, 1e-9 * s->first_dt,
                            "more than 1e-9 of the first step; wave speeds have run away");
@@ -3309,7 +3333,7 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
     const tlsph_desc *d = plan->desc;
     const struct { const char *name; double value, low, high; const char *allowed; } range[] = {
         {"cookie", (double)d->cookie, TLSPHI_COOKIE, TLSPHI_COOKIE, "what tlsph_desc_default sets"},
-        {"dimension", d->dimension, 2, 3, "2 or 3"},
+        {"dimension", (double)d->dimension, 2, 3, "2 or 3"},
         {"unknowns", (double)d->unknowns, TLSPH_PF, TLSPH_PFH, "a tlsph_unknowns"},
         {"thermal", (double)d->thermal, TLSPH_ISOTHERMAL, TLSPH_ENTROPY, "a tlsph_thermal"},
         {"operator_kind", (double)d->operator_kind, TLSPH_CORRECTED_KERNEL, TLSPH_GIVEN, "a tlsph_operator_kind"},
@@ -3324,7 +3348,8 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"conduction", (double)d->conduction, TLSPH_COMPACT, TLSPH_DOUBLE_GRADIENT, "a tlsph_conduction"},
         {"integrator", (double)d->integrator, TLSPH_RK2, TLSPH_RK2, "a tlsph_integrator"},
         {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
-        {"threads", d->threads, 0, 4096, "0 to 4096"},
+        {"threads", (double)d->threads, 0, 4096, "0 to 4096"},
+        {"particles.spacing", (double)d->particles.spacing, 0, TLSPHI_LARGEST, "0 (from the weights) or more"},
         {"material_count", (double)d->material_count, 1, 256, "1 to 256"},
         {"particles.count", (double)d->particles.count, 2, 4294967294.0, "2 to 2^32 - 2"},
     };
@@ -3336,6 +3361,10 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
                          (!d->condition_count || d->conditions) &&
                          (d->operator_kind != TLSPH_CELLS || (d->particles.cells && d->particles.cell_count)) &&
                          (d->operator_kind != TLSPH_GIVEN || (d->particles.first && d->particles.neighbours && d->particles.pair_vectors));
+    if (!tlsphi_finite(d->particles.spacing))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "particles.spacing", TLSPH_NO_PARTICLE, (double)d->particles.spacing, 0, "finite");
+    if (!d->allocator.allocate != !d->allocator.release)
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "allocator", TLSPH_NO_PARTICLE, 0, 0, "both functions or neither");
     if (!pointers)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "a pointer", TLSPH_NO_PARTICLE, 0, 0,
                                 "not NULL: materials, positions, volumes, conditions and what the operator needs");
@@ -3368,6 +3397,10 @@ static tlsph_result tlsphi_check_materials(tlsphi_plan *plan) {
     }
     return TLSPH_OK;
 }
+/* The particles that a condition concerns: a list, or all. */
+static size_t tlsphi_set_size(const tlsphi_plan *plan, const tlsph_condition *c) { return c->particles ? c->count : plan->n; }
+static uint32_t tlsphi_set_host(const tlsph_condition *c, size_t i) { return c->particles ? c->particles[i] : (uint32_t)i; }
+
 static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condition *c) {
     const size_t n = plan->n;
     const int plane = c->kind == TLSPH_ROLLER || c->kind == TLSPH_TANGENT || c->kind == TLSPH_WALL;
@@ -3388,17 +3421,15 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
         if (c->particles[i] >= n)
             return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particle number", c->particles[i], (double)c->particles[i], (double)n,
                                     "less than the number of particles");
-    const size_t area_count = (c->particles ? c->count : n) * (c->kind == TLSPH_PRESSURE ? 3 : 1);
-    for (size_t i = 0; c->areas && i < area_count; i++)
+    const size_t per = c->kind == TLSPH_PRESSURE ? 3 : 1;
+    for (size_t i = 0; c->areas && i < per * tlsphi_set_size(plan, c); i++)
         if (!tlsphi_finite(c->areas[i]))
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "area", TLSPH_NO_PARTICLE, (double)c->areas[i], 0, "finite");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "area", tlsphi_set_host(c, i / per), (double)c->areas[i], 0, "finite");
     return TLSPH_OK;
 }
 
 /* ==== [CREATION] =================================================================================================== */
 
-static size_t tlsphi_set_size(const tlsphi_plan *plan, const tlsph_condition *c) { return c->particles ? c->count : plan->n; }
-static uint32_t tlsphi_set_host(const tlsph_condition *c, size_t i) { return c->particles ? c->particles[i] : (uint32_t)i; }
 static int tlsphi_is_constraint(tlsph_condition_kind kind) { return kind == TLSPH_CLAMPED || kind == TLSPH_ROLLER || kind == TLSPH_TANGENT; }
 
 /* Adds what is new in direction e to the orthonormal fixed directions of a particle (Gram-Schmidt). */
@@ -3639,7 +3670,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->size.bytes_per_pair = sizeof(uint32_t) + D * sizeof(tlsph_real);
     s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
     s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
-    s->size.bytes = arena->used;
+    s->size.bytes = arena->used + 63;
     s->size.pairs = s->pairs;
     s->size.neighbours_least = plan->least;
     s->size.neighbours_most = plan->most;
@@ -3883,10 +3914,10 @@ static tlsph_result tlsphi_take_block(tlsphi_plan *plan, const tlsph_size *size,
     const tlsph_desc *d = plan->desc;
     memset(arena, 0, sizeof *arena);
     arena->size = size->bytes;
-    if (d->memory && (d->memory_size < size->bytes || ((uintptr_t)d->memory & 63)))
+    if (d->memory && d->memory_size < size->bytes)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "memory_size", TLSPH_NO_PARTICLE, (double)d->memory_size, (double)size->bytes,
-                                "tlsph_measure's bytes or more, aligned to 64 bytes");
-    arena->memory = (unsigned char *)(d->memory ? d->memory : plan->allocator.allocate(plan->allocator.user, size->bytes + 64));
+                                "tlsph_measure's bytes or more");
+    arena->memory = (unsigned char *)(d->memory ? d->memory : plan->allocator.allocate(plan->allocator.user, size->bytes));
     return arena->memory ? TLSPH_OK : tlsphi_no_memory(plan, (double)size->bytes);
 }
 static tlsph_result tlsphi_create_planned(tlsphi_plan *plan, tlsph_solver **out) {
@@ -3896,8 +3927,8 @@ static tlsph_result tlsphi_create_planned(tlsphi_plan *plan, tlsph_solver **out)
     if (r || (r = tlsphi_take_block(plan, &draft.size, &arena))) return r;
     unsigned char *const block = arena.memory;
     const size_t size = draft.size.bytes;
-    if (!plan->desc->memory) arena.memory += 64 - ((uintptr_t)block & 63); /* line up with cache lines */
-    memset(arena.memory, 0, size);
+    memset(block, 0, size);
+    arena.memory += (64 - ((uintptr_t)block & 63)) & 63; /* line up with cache lines; the size has room for it */
     s = (tlsph_solver *)(void *)arena.memory;
     memset(&draft, 0, sizeof draft);
     tlsphi_copy_options(&draft, plan);
@@ -3905,7 +3936,7 @@ static tlsph_result tlsphi_create_planned(tlsphi_plan *plan, tlsph_solver **out)
     tlsphi_layout(s, &arena, plan);
     s->allocator = plan->allocator;
     s->memory = block;
-    s->memory_size = size + 64;
+    s->memory_size = size;
     s->owns_memory = !plan->desc->memory;
     r = tlsphi_fill_solver(s, plan);
     if (r) tlsph_destroy(s);
@@ -4128,6 +4159,8 @@ static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
     }
     if (!(f->jitter >= 0) || !(f->jitter <= TLSPHI_R(0.45)))
         return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "jitter", (double)f->jitter, "0 to 0.45");
+    if (!f->allocator.allocate != !f->allocator.release)
+        return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "allocator", 0, "both functions or neither");
     return f->inner_radius >= 0 ? TLSPH_OK : tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "inner_radius", (double)f->inner_radius, "0 or more");
 }
 /* Lines, inside flags and numbers in one scratch block. */
