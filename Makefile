@@ -1,0 +1,121 @@
+# GNU make. Needs cc and make only; everything else (OpenMP, clang, C++, valgrind, nm) is looked for and used if present.
+#
+#   make            examples -> build/<example>         make test    unit and physics tests, about 3 minutes
+#   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
+#   make bench      timings                             make coverage, make clean
+#
+# CFLAGS are yours (default -O3 -march=native); threads: OMP_NUM_THREADS or --threads of the examples.
+
+CC ?= cc
+CFLAGS ?= -O3 -march=native
+WARNINGS := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wdouble-promotion -Wstrict-prototypes
+BASE := -std=c99 $(WARNINGS) -I. -MMD -MP
+LDLIBS := -lm
+REFERENCES := $(CURDIR)/tests/references
+
+# Does the compiler take these flags, and does a program link that holds this line?
+takes = $(shell printf '%s\nint main(void) { return 0; }\n' '$(2)' | $(CC) $(1) -x c - -o /dev/null 2> /dev/null && echo yes)
+comma := ,
+OPENMP := $(if $(call takes,-fopenmp,int omp_get_max_threads(void); int (*probe)(void) = omp_get_max_threads;),-fopenmp)
+SANITIZE := $(if $(call takes,-fsanitize=address$(comma)undefined),-fsanitize=address$(comma)undefined -fno-sanitize-recover=all)
+VALGRIND := $(shell command -v valgrind 2> /dev/null)
+
+EXAMPLES := $(patsubst examples/%.c,build/%,$(wildcard examples/*.c))
+# One archive a flavour: the library and what examples, tests and benches share. A program takes from it what it needs.
+SHARED := $(wildcard examples/common/*.c examples/scenes/*.c) tests/implementation.c
+TESTS := $(filter-out tests/implementation.c,$(wildcard tests/*.c))
+TOPICS := $(patsubst tests/test_%.c,%,$(wildcard tests/test_*.c))
+BENCHES := $(wildcard bench/*.c)
+
+all: $(EXAMPLES)
+	@echo "examples are in build/ (each tells its options with --help)"
+
+demo: build/l_block
+	build/l_block
+
+# ---- flavours: $(call flavour,name,flags of the library,flags of the tests) ----
+
+define flavour
+build/obj/$(1)/tests/%.o: tests/%.c build/suites.h
+	@mkdir -p $$(@D)
+	$$(CC) $(BASE) $(3) -DREFERENCES='"$(REFERENCES)"' -Ibuild -c $$< -o $$@
+build/obj/$(1)/%.o: %.c
+	@mkdir -p $$(@D)
+	$$(CC) $(BASE) $(2) -c $$< -o $$@
+build/obj/$(1)/tests/implementation.o: tests/implementation.c
+	@mkdir -p $$(@D)
+	$$(CC) $(BASE) $(2) -c $$< -o $$@
+build/obj/$(1)/shared.a: $(SHARED:%.c=build/obj/$(1)/%.o)
+	@rm -f $$@
+	$$(AR) rcs $$@ $$^
+build/test_$(1): $(TESTS:%.c=build/obj/$(1)/%.o) build/obj/$(1)/shared.a
+	$$(CC) $(2) $$^ -o $$@ $(LDLIBS)
+endef
+
+FLOAT := -DTLSPH_REAL_FLOAT
+ASSERT := -DCHECK_INVARIANTS
+$(eval $(call flavour,double,$(CFLAGS) $(OPENMP),-O1))
+$(eval $(call flavour,float,$(CFLAGS) $(OPENMP) $(FLOAT),-O1 $(FLOAT)))
+$(eval $(call flavour,sanitized,-O1 -g $(SANITIZE) $(ASSERT),-O1 -g $(SANITIZE)))
+$(eval $(call flavour,sanitized_float,-O1 -g $(SANITIZE) $(ASSERT) $(FLOAT),-O1 -g $(SANITIZE) $(FLOAT)))
+$(eval $(call flavour,valgrind,-O1 -g,-O1 -g))
+# The header promises to find values that are not finite even so.
+$(eval $(call flavour,fast_math,-O3 -ffast-math,-O1))
+$(eval $(call flavour,coverage,-O0 -g --coverage,-O0))
+
+# ---- programs ----
+
+$(EXAMPLES): build/%: build/obj/double/examples/%.o build/obj/double/shared.a
+	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
+
+build/bench: $(BENCHES:%.c=build/obj/double/%.o) build/obj/double/shared.a
+	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
+
+bench: $(if $(BENCHES),build/bench)
+	$(if $(BENCHES),build/bench --quick,@echo "no bench")
+
+# The list of test files; rewritten only when it changes.
+build/suites.h: FORCE
+	@mkdir -p build
+	@for topic in $(TOPICS); do echo "SUITE_NAME($$topic)"; done > $@.new
+	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+
+# ---- tests: tests/run.sh adds up the summaries of its arguments ----
+
+QUICK := $(filter-out physics%,$(TOPICS))
+SKIPPED = echo "$(1)"; echo "0 passed, 0 failed, 1 skipped"
+FAST_STEPS := "build/test_double" "build/test_float" "CC='$(CC)' sh tests/header.sh"
+SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
+SLOW_STEPS := "build/test_double --slow" "build/test_fast_math errors/" \
+  $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
+    "$(call SKIPPED,no sanitizers)") \
+  $(if $(VALGRIND),"valgrind -q --error-exitcode=9 --leak-check=full build/test_valgrind checkpoint/continues memory/ errors/ operators/cells fill/refusals",\
+    "$(call SKIPPED,no valgrind)")
+SLOW_PROGRAMS := build/test_double build/test_fast_math $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
+
+test: build/test_double build/test_float
+	@sh tests/run.sh $(FAST_STEPS)
+
+check: build/test_float $(SLOW_PROGRAMS)
+	@sh tests/run.sh $(FAST_STEPS) $(SLOW_STEPS)
+
+# What check does beside test (for .ci/run).
+check-only: $(SLOW_PROGRAMS)
+	@sh tests/run.sh $(SLOW_STEPS)
+
+# Branches of the header that the tests take, as gcov counts them.
+coverage: build/test_coverage
+	@find build/obj/coverage -name '*.gcda' -delete
+	build/test_coverage
+	cd build/obj/coverage && gcov -b -o tests implementation.c > gcov.txt 2> /dev/null
+	@sed -n "/^File.*tlsph.h'/,/^$$/p" build/obj/coverage/gcov.txt
+	@sed -n "/^File.*tlsph.h'/,/^$$/s/^Taken at least once:\([0-9.]*\)%.*/result branch_coverage \1 %/p" build/obj/coverage/gcov.txt
+
+clean:
+	rm -rf build out
+
+FORCE:
+.PHONY: all demo bench test check check-only coverage clean FORCE
+.SECONDARY:
+
+-include $(shell find build/obj -name '*.d' 2> /dev/null)

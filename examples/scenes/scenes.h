@@ -1,0 +1,268 @@
+/*
+scenes.h - the scenes that examples, tests and benches share
+
+A scene is a geometry with material, loads and initial state, and its exact or published answer. Each one has
+    <scene>_parameters           what may be changed, all in SI units
+    <scene>_default(p)           fills it with the values of the source that the scene names
+    <scene>_create(p, out, err)  makes cloud and solver at time 0; on error `out` is empty. `out` must stay where it is,
+                                 because loads point into it
+    scene_destroy(&out->body)    gives all of it back
+and functions for exact answers and errors. Common options live in scene_options, once for all scenes.
+Nothing here prints or writes files; driver.h does that for the examples.
+*/
+#ifndef SCENES_H
+#define SCENES_H
+
+#include "../../tlsph.h"
+#include "../common/common.h"
+
+#define SCENE_PI 3.14159265358979323846
+
+/* ---- options common to all scenes ---------------------------------------------------------------------------------- */
+
+/* What every scene lets one choose. Integers are those of the enumerations in tlsph.h. */
+typedef struct scene_options {
+    double end_time;             /* s */
+    double cfl, support;
+    int unknowns, thermal, operator_kind, kernel, dissipation, volume_coupling, conduction, integrator;
+    int projection, audit, threads;
+    int frames, quiet;           /* used by drivers only */
+    const char *output;
+} scene_options;
+
+#define SCENE_OPTION_COUNT 16
+
+/* The library's own defaults, no end time, one frame. */
+void scene_options_default(scene_options *options);
+/* Fills table[SCENE_OPTION_COUNT] with command line entries that write into *options. */
+void scene_option_table(scene_options *options, ex_option *table);
+void scene_options_apply(const scene_options *options, tlsph_desc *desc);
+
+/* ---- a body under construction -------------------------------------------------------------------------------------- */
+
+typedef struct scene_body {
+    tlsph_cloud cloud;
+    tlsph_material material;
+    tlsph_solver *solver;
+    void *operator_memory; /* of scene_fourth_order, or NULL */
+} scene_body;
+
+#define SCENE_CONDITIONS 16
+
+/* Conditions and the lists that they point to, needed until the solver has copied them. Start with scene_begin, end
+   with scene_end in every case: failures on the way are kept in `result` and come out there. */
+typedef struct scene_setup {
+    scene_body body;
+    tlsph_condition conditions[SCENE_CONDITIONS];
+    void *lists[2 * SCENE_CONDITIONS];
+    size_t condition_count, list_count;
+    tlsph_result result;
+} scene_setup;
+
+void scene_begin(scene_setup *setup, const tlsph_fill *fill, const tlsph_material *material, tlsph_error *error);
+/* A condition on all particles; the pointer is never NULL and lives until scene_end. */
+tlsph_condition *scene_add(scene_setup *setup, tlsph_condition_kind kind);
+/* On the particles with X[axis] = value, with the normal along the axis. */
+tlsph_condition *scene_add_plane(scene_setup *setup, tlsph_condition_kind kind, int axis, double value);
+/* On the particles chosen by inside(user, X) != 0. */
+tlsph_condition *scene_add_where(scene_setup *setup, tlsph_condition_kind kind, tlsph_inside_fn inside, void *user);
+/* Rollers on both faces across `axis` of the box that the cloud fills. */
+void scene_add_rollers(scene_setup *setup, int axis);
+/* Shares the area of a plane face among the condition's particles by their tributary volumes, so that it adds up. */
+void scene_share_area(scene_setup *setup, tlsph_condition *condition, double area);
+/* Replaces volumes and pairs of a box lattice by fourth-order lines along `axis` (summation by parts 4-2, METHOD section 6)
+   and the usual pairs across; needs 8 spacings along the axis and the operator TLSPH_GIVEN. The stencil of second order
+   makes waves (kh)^2/6 too slow, this one (kh)^4/30. */
+void scene_fourth_order(scene_setup *setup, int dimension, int axis);
+/* Creates the solver from all of it. `out` owns the result; empty on error. */
+tlsph_result scene_end(scene_setup *setup, const scene_options *options, scene_body *out, tlsph_error *error);
+/* Position, velocity, deformation gradient and temperature of a material point; filled with X, 0, I, theta_R before. */
+typedef struct scene_state { double x[3], v[3], F[9], theta; } scene_state;
+typedef void (*scene_state_fn)(const void *scene, const tlsph_real X[3], scene_state *state);
+/* Writes a state into every particle and starts the ledger anew. */
+tlsph_result scene_set_state(scene_body *body, const void *scene, scene_state_fn state);
+void scene_destroy(scene_body *body);
+
+/* ---- reading ---------------------------------------------------------------------------------------------------------- */
+
+/* A copy of a field, to be freed; NULL without memory or where the scene lacks the field. */
+tlsph_real *scene_read(const tlsph_solver *solver, tlsph_field field);
+/* Host number of the particle nearest to X. */
+size_t scene_nearest(const tlsph_particles *particles, double x, double y, double z);
+/* The material of 000 section 7.1 (also of 7.2): E = 50.05 kPa, nu = 0.3, rho = 1000 kg/m^3, h = 10 W/(m K),
+   C_v = 1 J/(kg K), alpha = 2.223e-4 1/K, theta_R = 293.15 K. The paper gives neither q, xi_R nor gamma_R: q = 1 and
+   no Mooney terms here. */
+tlsph_material scene_paper_material(tlsph_material_kind kind);
+/* Linear thermal expansion that gives a coupling delta = (c_v Gamma_0)^2 theta_R / (c_v (lambda + 2 mu)), where
+   c_v Gamma_0 = 3 kappa alpha (METHOD section 1). */
+double scene_expansion(const tlsph_material *material, double delta);
+/* P-wave modulus lambda + 2 mu, bulk modulus kappa and shear modulus mu, Pa. */
+void scene_moduli(const tlsph_material *material, double *p_wave, double *bulk, double *shear);
+
+/* ---- L-shaped block: 000 section 7.2 ---------------------------------------------------------------------------------- */
+
+typedef struct l_block_parameters {
+    scene_options options;
+    double spacing;       /* m; 0.64, 0.46, 0.3, 0.195 give 792, 1920, 5324, 17152 particles (figure 5: 680 ... 17600) */
+    double force[3];      /* N at f = 1: F1 on the face Y = 10 m, -F1 on X = 6 m */
+    double ramp;          /* s; f rises for this time and falls for as long, then nothing acts */
+    double hot, cold;     /* K, on Y = 10 m and on X = 6 m at t = 0 */
+} l_block_parameters;
+
+typedef struct l_block {
+    scene_body body;
+    l_block_parameters parameters;
+    size_t probe;         /* particle at X = (0, 10, 0) m (figure 7) */
+    double traction[3];   /* Pa at f = 1 */
+} l_block;
+
+void l_block_default(l_block_parameters *parameters);
+tlsph_result l_block_create(const l_block_parameters *parameters, l_block *out, tlsph_error *error);
+/* Impulse of one of the two forces over the whole loading, N s: the scale of momenta in this scene. */
+double l_block_impulse(const l_block_parameters *parameters);
+
+/* ---- thermo-elastic standing wave (references/README, thermoelastic_standing_wave.csv) -------------------------------- */
+
+typedef struct standing_wave_parameters {
+    scene_options options;
+    int dimension;        /* 2 or 3 */
+    int n;                /* spacings a wavelength, even */
+    int across;           /* spacings across the bar */
+    int order;            /* 2: the library's lattice operator; 4: scene_fourth_order, from n = 16 */
+    double length;        /* m; half a wavelength */
+    double delta;         /* thermo-elastic coupling */
+    double conductivity;  /* W/(m K) */
+    double amplitude;     /* of the displacement, m */
+    double periods;       /* over which frequency and damping are measured */
+} standing_wave_parameters;
+
+typedef struct standing_wave {
+    scene_body body;
+    standing_wave_parameters parameters;
+    double k;             /* 1/m */
+    double s[2];          /* exact root of the mode e^{st}: real and imaginary part, 1/s */
+    double ratio[2];      /* exact b/a: temperature by displacement amplitude, K/m */
+} standing_wave;
+
+void standing_wave_default(standing_wave_parameters *parameters);
+/* Conductivity at which conduction and wave are equally fast, D k^2 = c k: there damping by conduction is large. */
+double standing_wave_matched_conductivity(const standing_wave_parameters *parameters);
+tlsph_result standing_wave_create(const standing_wave_parameters *parameters, standing_wave *out, tlsph_error *error);
+/* Exact root s and ratio b/a of a bar of density rho, P-wave modulus M, c_v (per volume) and conductivity h. */
+void standing_wave_mode(double k, double rho, double M, double c_v, double h, double T0, double delta, double s[2],
+                        double ratio[2]);
+/* Exact displacement (m), velocity (m/s), strain and temperature difference (K) at X and t. */
+void standing_wave_exact(const standing_wave *wave, double X, double t, double *u, double *v, double *strain,
+                         double *theta);
+/* Amplitude of the velocity's part along sin kX now, m/s. */
+double standing_wave_amplitude(const standing_wave *wave);
+/* Relative L2 errors of displacement and temperature now, by the amplitudes of the modes. */
+void standing_wave_errors(const standing_wave *wave, double *error_u, double *error_theta);
+/* Fits e^{st} to samples y(t): s starts as a guess and ends as the least-squares root. Returns 0 when it converged. */
+int standing_wave_fit(const double *t, const double *y, size_t count, double s[2]);
+/* Time at which the measurement ends, s: after `periods`, or at the options' end time (0: none) if that is earlier. */
+double standing_wave_end(const standing_wave *wave);
+/* Runs to that time and fits. `step` is called after each step with `user`; it may be NULL. */
+tlsph_result standing_wave_measure(standing_wave *wave, double s[2], void (*step)(void *user), void *user);
+
+/* ---- swinging cube: 001 section 7.1, METHOD sections 4 to 6, swinging_cube_t0.002.csv --------------------------------- */
+
+typedef struct swinging_cube_parameters {
+    scene_options options;
+    int n;                /* spacings a side of 1 m */
+    double jitter;        /* share of the spacing by which interior particles are moved */
+    double amplitude;     /* U0, m */
+    double young, poisson, density;
+    int linear;           /* 1: linear material, for which the solution is exact; 0: neo-Hookean */
+} swinging_cube_parameters;
+
+typedef struct swinging_cube {
+    scene_body body;
+    swinging_cube_parameters parameters;
+    double omega;         /* rad/s */
+} swinging_cube;
+
+void swinging_cube_default(swinging_cube_parameters *parameters);
+tlsph_result swinging_cube_create(const swinging_cube_parameters *parameters, swinging_cube *out, tlsph_error *error);
+/* Exact velocity (m/s), deformation gradient and stress (Pa) at X and t. */
+void swinging_cube_exact(const swinging_cube *cube, const tlsph_real X[3], double t, double v[3], double F[9],
+                         double P[9]);
+/* Relative L2 errors of p_x and P_xX now, over the particles. */
+void swinging_cube_errors(const swinging_cube *cube, double *error_p, double *error_P);
+
+/* ---- finite circularly polarised shear wave: finite_shear_wave.csv ---------------------------------------------------- */
+
+/* x = (l X + A cos q, l Y + A sin q, l3 Z), q = k Z - w t: exact in nonlinear elasticity without any force. */
+typedef struct shear_wave_parameters {
+    scene_options options;
+    int n;                /* spacings a wavelength of 1 m */
+    double width;         /* m, of the bar, whose surface moves as the exact solution */
+    double stretch, stretch_along; /* l, l3 */
+    double amplitude;     /* A, m */
+    double omega;         /* rad/s */
+    double theta;         /* K */
+    tlsph_material material;
+} shear_wave_parameters;
+
+typedef struct shear_wave {
+    scene_body body;
+    shear_wave_parameters parameters;
+    double k;             /* 1/m */
+} shear_wave;
+
+void shear_wave_default(shear_wave_parameters *parameters);
+tlsph_result shear_wave_create(const shear_wave_parameters *parameters, shear_wave *out, tlsph_error *error);
+void shear_wave_exact(const shear_wave *wave, const tlsph_real X[3], double t, double x[3], double v[3], double F[9]);
+/* Relative L2 errors of velocity and of the wave's part of F now, of particles deeper below the surface than `depth` (m):
+   on the surface gradients are one-sided, first order, and the stress there disturbs a layer below it. */
+void shear_wave_errors(const shear_wave *wave, double depth, double *error_v, double *error_F);
+
+/* ---- rotation with pulsating stretch: rotation_with_pulsating_stretch.csv --------------------------------------------- */
+
+/* F(t) = R(2 pi t about Z) diag(1 + 0.2 sin 3t, 1 + 0.1 (1 - cos 4t), 1 - 0.15 sin 2t), body force rho F'' X,
+   theta(0) = 310 K, adiabatic. */
+typedef struct pulsating_rotation_parameters {
+    scene_options options;
+    int n;                /* spacings a side of 1 m */
+    int hold_surface;     /* 1: exact velocity on the surface, without which the body is no longer homogeneous */
+    tlsph_material material;
+} pulsating_rotation_parameters;
+
+typedef struct pulsating_rotation {
+    scene_body body;
+    pulsating_rotation_parameters parameters;
+} pulsating_rotation;
+
+void pulsating_rotation_default(pulsating_rotation_parameters *parameters);
+tlsph_result pulsating_rotation_create(const pulsating_rotation_parameters *parameters, pulsating_rotation *out,
+                                       tlsph_error *error);
+/* F, F' and F'' at t. */
+void pulsating_rotation_exact(double t, double F[9], double rate[9], double second[9]);
+
+/* ---- symmetric impact: riemann_star_states.csv ------------------------------------------------------------------------- */
+
+typedef struct impact_parameters {
+    scene_options options;
+    int n;                /* spacings along the bar */
+    int across;           /* spacings across */
+    double length;        /* m; the halves meet at X = 0 */
+    double speed;         /* m/s of each half */
+    tlsph_material material;
+} impact_parameters;
+
+/* State between the two shocks. */
+typedef struct impact_star { double stress, jacobian, temperature; /* Pa (P_XX), -, K */ } impact_star;
+
+typedef struct impact {
+    scene_body body;
+    impact_parameters parameters;
+} impact;
+
+void impact_default(impact_parameters *parameters);
+tlsph_result impact_create(const impact_parameters *parameters, impact *out, tlsph_error *error);
+/* Means over |X| between the shares `from` and `to` of the shock's place now (speed of the shock: m/s, reference), and
+   largest overshoot of -P_XX over the exact star stress, as a share of it. */
+void impact_read(const impact *bar, double shock_speed, double from, double to, const impact_star *exact,
+                 impact_star *mean, double *overshoot);
+
+#endif
