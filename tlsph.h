@@ -18,15 +18,16 @@ USE
     #include "tlsph.h"
     #include <stdio.h>
     int main(void) {
-        tlsph_fill fill = tlsph_fill_default(3);            // a box of 4 m x 1 m x 1 m, particles every 0.25 m
+        tlsph_fill fill = tlsph_fill_default(3);    // a box of 4 m x 1 m x 1 m, particles every 0.25 m
         fill.size[0] = 4; fill.size[1] = 1; fill.size[2] = 1; fill.spacing = 0.25;
         tlsph_cloud beam; tlsph_error error;
         if (tlsph_cloud_create(&fill, &beam, &error)) { puts(error.message); return 1; }
         uint32_t root[1024];
-        tlsph_condition conditions[2] = { tlsph_condition_default(TLSPH_CLAMPED), tlsph_condition_default(TLSPH_ACCELERATION) };
+        tlsph_condition conditions[2] = { tlsph_condition_default(TLSPH_CLAMPED),
+                                          tlsph_condition_default(TLSPH_ACCELERATION) };
         conditions[0].particles = root;
-        conditions[0].count = tlsph_select_plane(&beam.particles, 0, 0, 1e-6, root, 1024);   // all particles at X = 0
-        conditions[1].value[1] = -9.81;                                                      // gravity on every particle
+        conditions[0].count = tlsph_select_plane(&beam.particles, 0, 0, 1e-6, root, 1024); // X = 0
+        conditions[1].value[1] = -9.81;                      // gravity on every particle
         tlsph_material rubber = tlsph_material_default(TLSPH_NEO_HOOKEAN);
         rubber.density = 1100; rubber.young = 1e6; rubber.poisson = 0.4;
         tlsph_desc desc = tlsph_desc_default(3);
@@ -35,9 +36,10 @@ USE
         desc.conditions = conditions;  desc.condition_count = 2;
         tlsph_solver *solver;
         if (tlsph_create(&desc, &solver, &error)) { puts(error.message); return 1; }
-        while (tlsph_time(solver) < 1) if (tlsph_step(solver, 0.01)) { puts(tlsph_last_error(solver)->message); break; }
+        while (tlsph_time(solver) < 1)
+            if (tlsph_step(solver, 0.01)) { puts(tlsph_last_error(solver)->message); break; }
         tlsph_ledger ledger; tlsph_ledger_read(solver, &ledger);
-        printf("t = %g s, kinetic energy %g J, residual %g J\n", ledger.time, ledger.kinetic_energy, ledger.energy_residual);
+        printf("t = %g s, kinetic energy %g J\n", ledger.time, ledger.kinetic_energy);
         tlsph_destroy(solver); tlsph_cloud_destroy(&beam); return 0;
     }
 
@@ -80,7 +82,7 @@ INDEX (search for the tag)
 #define TLSPH_API extern
 #endif
 
-/* A float build renames what creates solvers and clouds, so that mixing precisions fails at link time, not at run time. */
+/* A float build renames what creates solvers and clouds, so that mixing precisions fails at link time. */
 #ifdef TLSPH_REAL_FLOAT
 typedef float tlsph_real;
 #define tlsph_create tlsph_create_float
@@ -231,7 +233,7 @@ typedef struct tlsph_material_state {
     tlsph_real Sigma_F[9], Sigma_H[9], Sigma_J; /* conjugates of F, H, J at fixed entropy (000-10), Pa */
     tlsph_real theta, eta;                      /* temperature, K; entropy, J/(m^3 K) */
     tlsph_real internal_energy, helmholtz;      /* J/m^3 */
-    tlsph_real c_p, c_s;                        /* bounds of the material wave speeds, m/s: isentropic, over all directions */
+    tlsph_real c_p, c_s;                        /* bounds of the isentropic wave speeds over all directions, m/s */
 } tlsph_material_state;
 
 /* Boundary conditions, loads and contact. Angle brackets: what `value` means. */
@@ -314,9 +316,9 @@ typedef struct tlsph_desc {
     tlsph_real drift_stiffness;          /* b0 of the drift potential W, default 1 (METHOD: J equation) */
     tlsph_real drift_scale;              /* phi_c of W, default 0.03 */
     tlsph_real jump_share;               /* a_J, factor of the dissipation of J, default 0.5 */
-    tlsph_real drift_relaxation;         /* r0: relaxation of J towards det F, default 0 = none; 0.5 for long static loads */
+    tlsph_real drift_relaxation;         /* r0: relaxation of J to det F, default 0; 0.5 for long static loads */
     tlsph_conduction conduction;         /* default TLSPH_COMPACT */
-    int sharp_gradients;                 /* 1: fourth-order dispersion on lattices, about twice the cost; default 0. Needs an
+    int sharp_gradients;                 /* 1: fourth-order dispersion on lattices, twice the cost; default 0. Needs an
                                             antisymmetric operator: cells, given, or a box lattice with support 0.6 */
     int mirror_gradients;                /* 1: gradients know rollers and tangent planes; default 1 */
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
@@ -325,9 +327,9 @@ typedef struct tlsph_desc {
     tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1] */
     int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
-    tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP if enabled, else serial */
+    tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP, else serial */
     tlsph_allocator allocator;           /* zero: TLSPH_MALLOC and TLSPH_FREE */
-    void *memory;                        size_t memory_size;      /* caller's block for the solver, of any alignment (tlsph_measure), or NULL */
+    void *memory;                        size_t memory_size;      /* a block for the solver (tlsph_measure), or NULL */
 } tlsph_desc;
 
 /* What a solver of a description needs (see tlsph_measure). */
@@ -339,7 +341,8 @@ typedef struct tlsph_size {
     size_t neighbours_least, neighbours_most;
 } tlsph_size;
 
-/* Balances of the whole scene at the current time. Energies in J (2-D: J/m). Cumulative since creation or tlsph_ledger_reset. */
+/* Balances of the whole scene at the current time, J (2-D: J/m). "Cumulative": since creation, the last write before the
+   first step, or tlsph_ledger_reset. */
 typedef struct tlsph_ledger {
     double time; uint64_t step; double time_step;
     double mass, linear_momentum[3], angular_momentum[3]; /* about the origin */
@@ -356,7 +359,7 @@ typedef struct tlsph_ledger {
     double external_work;          /* cumulative, of loads and driven particles */
     double external_heat;          /* cumulative, into the body: sources, fluxes, prescribed temperatures */
     double external_entropy;       /* cumulative, that came with the external heat */
-    double projection_work;        /* cumulative work of the projection on the rigid motion: what the dissipation had taken from it */
+    double projection_work;        /* cumulative, on the rigid motion: what the dissipation had taken from it */
     double contact_loss;           /* cumulative kinetic energy stopped by walls (thermal scenes: turned into heat) */
     double impulse[3], angular_impulse[3]; /* cumulative, of loads (not of constraint reactions) */
     double energy_residual;        /* total - initial - work - heat (- losses where these leave the energy) */
@@ -369,7 +372,7 @@ typedef struct tlsph_ledger {
     double temperature_least, temperature_largest;
 } tlsph_ledger;
 
-/* Fields that can be read, with name, unit, components and what may be written. One list makes the codes, names and units. */
+/* Fields: code, name, unit, components, whether tlsph_write takes them. One list makes codes, names and units. */
 #define TLSPH_FIELDS(X)                                                                                                \
     X(TLSPH_FIELD_REFERENCE_POSITION, "reference_position", "m", 3, 0)                                                 \
     X(TLSPH_FIELD_POSITION, "position", "m", 3, 1)                                                                     \
@@ -393,7 +396,7 @@ typedef struct tlsph_ledger {
     X(TLSPH_FIELD_HELMHOLTZ_ENERGY, "helmholtz_energy", "J/m^3", 1, 0)                                                 \
     X(TLSPH_FIELD_P_WAVE_SPEED, "p_wave_speed", "m/s", 1, 0)                                                           \
     X(TLSPH_FIELD_S_WAVE_SPEED, "s_wave_speed", "m/s", 1, 0)                                                           \
-    X(TLSPH_FIELD_VELOCITY_GRADIENT, "velocity_gradient", "1/s", 9, 0) /* of the last stage, by X; not part of the state */                   \
+    X(TLSPH_FIELD_VELOCITY_GRADIENT, "velocity_gradient", "1/s", 9, 0) /* by X; of the last stage, not of the state */     \
     X(TLSPH_FIELD_VOLUME, "volume", "m^3", 1, 0)                                                                       \
     X(TLSPH_FIELD_MASS, "mass", "kg", 1, 0)                                                                            \
     X(TLSPH_FIELD_BOUNDARY_AREA, "boundary_area", "m^2", 3, 0)   /* B_a = -sum_b C_ab^skew, outward */                 \
@@ -411,7 +414,7 @@ typedef enum tlsph_field {
 typedef enum tlsph_shape {
     TLSPH_BOX,      /* origin, size */
     TLSPH_L_SHAPE,  /* the box without the quadrant X > origin + notch in the first two directions */
-    TLSPH_CYLINDER, /* in the box, along `axis`, largest radius that fits; hollow with inner_radius. 2-D: a disk or ring */
+    TLSPH_CYLINDER, /* in the box along `axis`, as wide as fits; hollow with inner_radius. 2-D: a disk, a ring */
     TLSPH_SPHERE,   /* in the box; hollow with inner_radius */
     TLSPH_PREDICATE /* where inside(user, X) is not 0, within the box */
 } tlsph_shape;
@@ -431,7 +434,7 @@ typedef struct tlsph_fill {
     int axis;                       /* TLSPH_CYLINDER: 0, 1 or 2 */
     tlsph_real spacing;             /* m; rounded in each direction so that the box holds whole cells */
     tlsph_placement placement;
-    tlsph_real jitter;              /* each interior coordinate is moved by up to jitter x spacing / 2 ... x 1, in [0, 0.45] */
+    tlsph_real jitter;              /* inner particles move by up to jitter x spacing along each axis; 0 to 0.45 */
     uint64_t seed;                  /* of the jitter */
     tlsph_inside_fn inside;         /* TLSPH_PREDICATE */
     void *inside_user;
@@ -485,7 +488,8 @@ TLSPH_API tlsph_fill tlsph_fill_default(int dimension);
    *cloud is empty. */
 TLSPH_API tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *cloud, tlsph_error *error);
 TLSPH_API void tlsph_cloud_destroy(tlsph_cloud *cloud);
-/* Numbers of all particles with |X[axis] - value| <= tolerance (m). Writes at most `capacity`, returns how many there are. */
+/* Numbers of all particles with |X[axis] - value| <= tolerance (m). Writes at most `capacity`, returns how many there
+   are. */
 TLSPH_API size_t tlsph_select_plane(const tlsph_particles *particles, int axis, tlsph_real value, tlsph_real tolerance,
                                     uint32_t *out, size_t capacity);
 /* The same for inside(user, X) != 0. */
@@ -503,7 +507,8 @@ TLSPH_API void tlsph_destroy(tlsph_solver *solver); /* NULL is allowed */
 
 /* -- step -- */
 /* One step of the stable size, but at most dt_limit (s, > 0; infinite allowed). ERROR_INVERSION, ERROR_TEMPERATURE,
-   ERROR_NOT_FINITE, ERROR_TIME_STEP: the state is that of the last good step, readable and saveable; see tlsph_last_error. */
+   ERROR_NOT_FINITE, ERROR_TIME_STEP: the state is that of the last good step, readable and saveable; see
+   tlsph_last_error. */
 TLSPH_API tlsph_result tlsph_step(tlsph_solver *solver, tlsph_real dt_limit);
 /* Steps until `time` (s) is met exactly. Does nothing if it is past. */
 TLSPH_API tlsph_result tlsph_advance(tlsph_solver *solver, tlsph_real time);
@@ -658,15 +663,14 @@ TLSPH_API void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_s
 
 #define TLSPHI_COOKIE 0x544c5350u /* "TLSP" */
 #define TLSPHI_NONE 0xffffffffu
-#define TLSPHI_LARGEST 1e300      /* stands for "no bound" in reductions */
+#define TLSPHI_LARGEST 1e300 /* stands for "no bound" in reductions */
 #ifdef TLSPH_REAL_FLOAT
 #define TLSPHI_EPSILON 1.1920929e-7
 #else
 #define TLSPHI_EPSILON 2.220446049250313e-16
 #endif
 
-typedef tlsph_real tlsphi_r; /* for short casts of constants */
-#define TLSPHI_R(x) ((tlsphi_r)(x))
+#define TLSPHI_R(x) ((tlsph_real)(x)) /* a constant in the precision of the build */
 
 TLSPHI_INLINE tlsph_real tlsphi_max(tlsph_real a, tlsph_real b) { return a > b ? a : b; }
 TLSPHI_INLINE tlsph_real tlsphi_min(tlsph_real a, tlsph_real b) { return a < b ? a : b; }
@@ -690,7 +694,8 @@ TLSPHI_INLINE int tlsphi_nan(tlsph_real x) { /* not finite, and not equal to inf
     return !tlsphi_finite(x) && memcmp(&x, &infinity, sizeof x) != 0 && memcmp(&x, &minus, sizeof x) != 0;
 }
 static int tlsphi_all_finite(const tlsph_real *x, size_t n) {
-    for (size_t i = 0; i < n; i++) if (!tlsphi_finite(x[i])) return 0;
+    for (size_t i = 0; i < n; i++)
+        if (!tlsphi_finite(x[i])) return 0;
     return 1;
 }
 
@@ -730,9 +735,13 @@ TLSPHI_DEF const char *tlsph_result_text(tlsph_result result) {
     return (unsigned)result < (unsigned)TLSPH_RESULT_COUNT ? texts[result] : "no such result";
 }
 
-static void *tlsphi_default_allocate(void *user, size_t size) { (void)user; return TLSPH_MALLOC(size); }
+static void *tlsphi_default_allocate(void *user, size_t size) {
+    (void)user;
+    return TLSPH_MALLOC(size);
+}
 static void tlsphi_default_release(void *user, void *memory, size_t size) {
-    (void)user; (void)size;
+    (void)user;
+    (void)size;
     TLSPH_FREE(memory);
 }
 static tlsph_allocator tlsphi_allocator(const tlsph_allocator *given) {
@@ -746,14 +755,24 @@ static tlsph_allocator tlsphi_allocator(const tlsph_allocator *given) {
 }
 
 /* A bump allocator over one block. With memory == NULL it only counts, so the same code measures and lays out. */
-typedef struct tlsphi_arena { unsigned char *memory; size_t used, size; int overflow; } tlsphi_arena;
+typedef struct tlsphi_arena {
+    unsigned char *memory;
+    size_t used, size;
+    int overflow;
+} tlsphi_arena;
 
 static void *tlsphi_take(tlsphi_arena *arena, size_t count, size_t size) {
     size_t start = (arena->used + 63) & ~(size_t)63;
-    if (size && count > (SIZE_MAX / 4 - start) / size) { arena->overflow = 1; return NULL; }
+    if (size && count > (SIZE_MAX / 4 - start) / size) {
+        arena->overflow = 1;
+        return NULL;
+    }
     arena->used = start + count * size;
     if (!arena->memory) return NULL;
-    if (arena->used > arena->size) { arena->overflow = 1; return NULL; }
+    if (arena->used > arena->size) {
+        arena->overflow = 1;
+        return NULL;
+    }
     return arena->memory + start;
 }
 #define TLSPHI_TAKE(arena, type, count) ((type *)tlsphi_take((arena), (count), sizeof(type)))
@@ -779,7 +798,8 @@ TLSPHI_INLINE void tlsphi_multiply_transposed(int n, const tlsph_real *A, const 
     }
 }
 /* y = (A + B) x / 2 */
-TLSPHI_INLINE void tlsphi_multiply_mean(int n, const tlsph_real *A, const tlsph_real *B, const tlsph_real *x, tlsph_real *y) {
+TLSPHI_INLINE void tlsphi_multiply_mean(int n, const tlsph_real *A, const tlsph_real *B, const tlsph_real *x,
+                                        tlsph_real *y) {
     TLSPHI_UNROLL for (int i = 0; i < n; i++) {
         y[i] = (A[i * n] + B[i * n]) * x[0];
         TLSPHI_UNROLL for (int j = 1; j < n; j++) y[i] += (A[i * n + j] + B[i * n + j]) * x[j];
@@ -788,9 +808,7 @@ TLSPHI_INLINE void tlsphi_multiply_mean(int n, const tlsph_real *A, const tlsph_
 }
 /* A += a (x) b */
 TLSPHI_INLINE void tlsphi_add_outer(int n, tlsph_real *A, const tlsph_real *a, const tlsph_real *b) {
-    TLSPHI_UNROLL for (int i = 0; i < n; i++) {
-        TLSPHI_UNROLL for (int j = 0; j < n; j++) A[i * n + j] += a[i] * b[j];
-    }
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) { TLSPHI_UNROLL for (int j = 0; j < n; j++) A[i * n + j] += a[i] * b[j]; }
 }
 /* C = A B */
 TLSPHI_INLINE void tlsphi_product(int n, const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
@@ -810,16 +828,30 @@ TLSPHI_INLINE void tlsphi_product_transposed(int n, const tlsph_real *A, const t
 }
 /* Plane strain to 3-D: the out-of-plane diagonal entry is `last`. In 3-D a copy. */
 TLSPHI_INLINE void tlsphi_expand(int n, const tlsph_real *A, tlsph_real last, tlsph_real *out) {
-    if (n == 3) { memcpy(out, A, 9 * sizeof *out); return; }
-    out[0] = A[0]; out[1] = A[1]; out[2] = 0;
-    out[3] = A[2]; out[4] = A[3]; out[5] = 0;
-    out[6] = 0;    out[7] = 0;    out[8] = last;
+    if (n == 3) {
+        memcpy(out, A, 9 * sizeof *out);
+        return;
+    }
+    out[0] = A[0];
+    out[1] = A[1];
+    out[2] = 0;
+    out[3] = A[2];
+    out[4] = A[3];
+    out[5] = 0;
+    out[6] = 0;
+    out[7] = 0;
+    out[8] = last;
 }
 /* The in-plane part of a 3-D tensor. */
 TLSPHI_INLINE void tlsphi_shrink(int n, const tlsph_real *A, tlsph_real *out) {
-    if (n == 3) { memcpy(out, A, 9 * sizeof *out); return; }
-    out[0] = A[0]; out[1] = A[1];
-    out[2] = A[3]; out[3] = A[4];
+    if (n == 3) {
+        memcpy(out, A, 9 * sizeof *out);
+        return;
+    }
+    out[0] = A[0];
+    out[1] = A[1];
+    out[2] = A[3];
+    out[3] = A[4];
 }
 static void tlsphi_identity(tlsph_real *A) {
     for (int i = 0; i < 9; i++) A[i] = i % 4 == 0;
@@ -830,9 +862,15 @@ TLSPHI_DEF tlsph_real tlsph_determinant(const tlsph_real *F) {
 }
 /* Rows of cof F are cross products of the rows of F. */
 TLSPHI_DEF void tlsph_cofactor(const tlsph_real *F, tlsph_real *H) {
-    H[0] = F[4] * F[8] - F[5] * F[7]; H[1] = F[5] * F[6] - F[3] * F[8]; H[2] = F[3] * F[7] - F[4] * F[6];
-    H[3] = F[7] * F[2] - F[8] * F[1]; H[4] = F[8] * F[0] - F[6] * F[2]; H[5] = F[6] * F[1] - F[7] * F[0];
-    H[6] = F[1] * F[5] - F[2] * F[4]; H[7] = F[2] * F[3] - F[0] * F[5]; H[8] = F[0] * F[4] - F[1] * F[3];
+    H[0] = F[4] * F[8] - F[5] * F[7];
+    H[1] = F[5] * F[6] - F[3] * F[8];
+    H[2] = F[3] * F[7] - F[4] * F[6];
+    H[3] = F[7] * F[2] - F[8] * F[1];
+    H[4] = F[8] * F[0] - F[6] * F[2];
+    H[5] = F[6] * F[1] - F[7] * F[0];
+    H[6] = F[1] * F[5] - F[2] * F[4];
+    H[7] = F[2] * F[3] - F[0] * F[5];
+    H[8] = F[0] * F[4] - F[1] * F[3];
 }
 /* (A x B)_iI = e_ijk e_IJK A_jJ B_kK: the polar form of the cofactor, cof(A + B) = cof A + A x B + cof B. */
 TLSPHI_DEF void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
@@ -892,12 +930,17 @@ static void tlsphi_stretches(const tlsph_real *F, double out[3]) {
     double C[9], Q[9];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            C[3 * i + j] = (double)F[i] * (double)F[j] + (double)F[3 + i] * (double)F[3 + j] + (double)F[6 + i] * (double)F[6 + j];
+            C[3 * i + j] =
+                (double)F[i] * (double)F[j] + (double)F[3 + i] * (double)F[3 + j] + (double)F[6 + i] * (double)F[6 + j];
     tlsphi_eigen(C, Q);
     for (int i = 0; i < 3; i++) out[i] = sqrt(tlsphi_dmax(C[4 * i], 0));
     for (int pass = 0; pass < 2; pass++)
         for (int i = 0; i < 2; i++)
-            if (out[i] < out[i + 1]) { const double swap = out[i]; out[i] = out[i + 1]; out[i + 1] = swap; }
+            if (out[i] < out[i + 1]) {
+                const double swap = out[i];
+                out[i] = out[i + 1];
+                out[i + 1] = swap;
+            }
 }
 /* Upper bound of the largest eigenvalue of a 3x3 semi-definite tensor from its trace and the trace of its square;
    exact when the two smaller ones are equal, and much cheaper than the eigenvalue. */
@@ -944,10 +987,10 @@ TLSPHI_DEF void tlsph_kernel_evaluate(tlsph_kernel kernel, int dimension, tlsph_
 typedef struct tlsphi_grid {
     size_t count, buckets;
     int dimension;
-    double low[3], width;     /* corner and edge of the cells, m */
-    uint64_t *key;            /* Morton number of each particle, in sorted order */
-    uint32_t *order;          /* host number, in sorted order */
-    uint32_t *table;          /* hash table: sorted position of a cell's first particle, or TLSPHI_NONE */
+    double low[3], width; /* corner and edge of the cells, m */
+    uint64_t *key;        /* Morton number of each particle, in sorted order */
+    uint32_t *order;      /* host number, in sorted order */
+    uint32_t *table;      /* hash table: sorted position of a cell's first particle, or TLSPHI_NONE */
 } tlsphi_grid;
 
 #define TLSPHI_GRID_BITS 21 /* per axis: three fit into 63 bits */
@@ -1009,28 +1052,31 @@ static void tlsphi_grid_hash(tlsphi_grid *grid) {
    of pairs, and whether C is antisymmetric by itself. Each builder answers one question: which neighbours has host
    particle a, and what is g_ab for each? */
 
-typedef struct tlsphi_scratch { void *memory; size_t size; } tlsphi_scratch;
+typedef struct tlsphi_scratch {
+    void *memory;
+    size_t size;
+} tlsphi_scratch;
 
 typedef struct tlsphi_plan {
     const tlsph_desc *desc;
     tlsph_allocator allocator;
     tlsph_error *error;
     int dim;
-    size_t n, pairs, least, most;    /* particles, directed pairs, fewest and most neighbours */
-    double h;                        /* smoothing length */
+    size_t n, pairs, least, most; /* particles, directed pairs, fewest and most neighbours */
+    double h;                     /* smoothing length */
     tlsphi_grid grid;
-    const tlsph_real *weights;       /* w_a */
-    size_t *cell_first;              /* TLSPH_CELLS: cells around each particle, */
+    const tlsph_real *weights; /* w_a */
+    size_t *cell_first;        /* TLSPH_CELLS: cells around each particle, */
     uint32_t *cell_of;
-    double *volume;                  /* and V_a made of them */
-    double *correction;              /* kernels: M_a, dim x dim each, host order */
-    int antisymmetric;               /* C_ab = -C_ba to round-off: the solver stores C itself */
-    uint32_t *host, *inner;          /* solver order -> host number, and back */
-    uint32_t *body;                  /* of each particle in solver order */
+    double *volume;         /* and V_a made of them */
+    double *correction;     /* kernels: M_a, dim x dim each, host order */
+    int antisymmetric;      /* C_ab = -C_ba to round-off: the solver stores C itself */
+    uint32_t *host, *inner; /* solver order -> host number, and back */
+    uint32_t *body;         /* of each particle in solver order */
     size_t bodies, blocks;
-    uint8_t *fixed;                  /* number of constrained directions of each particle (solver order), */
-    double *fixed_direction;         /* and these directions, orthonormal, dim x dim each */
-    size_t fixes, mirrors;           /* how many in all (see [CONDITIONS]) */
+    uint8_t *fixed;          /* number of constrained directions of each particle (solver order), */
+    double *fixed_direction; /* and these directions, orthonormal, dim x dim each */
+    size_t fixes, mirrors;   /* how many in all (see [CONDITIONS]) */
     tlsphi_scratch scratch[24];
     int scratches;
 } tlsphi_plan;
@@ -1058,10 +1104,13 @@ static tlsph_result tlsphi_plan_fail(tlsphi_plan *plan, tlsph_result result, con
     return tlsphi_fail(plan->error, result, "create", field, particle, value, limit, allowed);
 }
 static tlsph_result tlsphi_no_memory(tlsphi_plan *plan, double bytes) {
-    return tlsphi_plan_fail(plan, TLSPH_ERROR_MEMORY, "bytes", TLSPH_NO_PARTICLE, bytes, 0, "what the allocator can give");
+    return tlsphi_plan_fail(plan, TLSPH_ERROR_MEMORY, "bytes", TLSPH_NO_PARTICLE, bytes, 0,
+                            "what the allocator can give");
 }
 
-static const tlsph_real *tlsphi_position(const tlsphi_plan *plan, size_t a) { return plan->desc->particles.positions + 3 * a; }
+static const tlsph_real *tlsphi_position(const tlsphi_plan *plan, size_t a) {
+    return plan->desc->particles.positions + 3 * a;
+}
 
 static void tlsphi_difference(const tlsphi_plan *plan, size_t a, size_t b, double d[3]) {
     const tlsph_real *A = tlsphi_position(plan, a), *B = tlsphi_position(plan, b);
@@ -1217,19 +1266,20 @@ static tlsph_result tlsphi_cells_build(tlsphi_plan *plan) {
     if (!plan->cell_first || !plan->cell_of || !plan->volume) return tlsphi_no_memory(plan, 16.0 * (double)plan->n);
     for (size_t i = 0; i < corners; i++) {
         if (p->cells[i] >= plan->n)
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "corner of a cell", TLSPH_NO_PARTICLE, (double)p->cells[i],
-                                    (double)plan->n, "less than the number of particles");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "corner of a cell", TLSPH_NO_PARTICLE,
+                                    (double)p->cells[i], (double)plan->n, "less than the number of particles");
         plan->cell_first[p->cells[i] + 2]++;
     }
     for (size_t a = 0; a < plan->n; a++) plan->cell_first[a + 2] += plan->cell_first[a + 1];
-    for (size_t i = 0; i < corners; i++) plan->cell_of[plan->cell_first[p->cells[i] + 1]++] = (uint32_t)(i >> plan->dim);
+    for (size_t i = 0; i < corners; i++)
+        plan->cell_of[plan->cell_first[p->cells[i] + 1]++] = (uint32_t)(i >> plan->dim);
     for (size_t c = 0; c < p->cell_count; c++) {
         double size[3];
         tlsphi_cell_size(plan, c, size);
         for (int axis = 0; axis < plan->dim; axis++)
             if (!(size[axis] > 0))
-                return tlsphi_plan_fail(plan, TLSPH_ERROR_VOLUME, "edge of a cell", p->cells[c << plan->dim], size[axis], 0,
-                                        "more than 0, corners numbered x fastest");
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_VOLUME, "edge of a cell", p->cells[c << plan->dim],
+                                        size[axis], 0, "more than 0, corners numbered x fastest");
         for (int k = 0; k < 1 << plan->dim; k++)
             plan->volume[p->cells[(c << plan->dim) + (size_t)k]] += size[0] * size[1] * size[2] / (1 << plan->dim);
     }
@@ -1243,11 +1293,12 @@ static tlsph_result tlsphi_given_check(tlsphi_plan *plan) {
     const tlsph_particles *p = &plan->desc->particles;
     for (size_t a = 0; a < plan->n; a++) {
         if (p->first[a + 1] < p->first[a])
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "first", a, (double)p->first[a + 1], (double)p->first[a], "not falling");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "first", a, (double)p->first[a + 1], (double)p->first[a],
+                                    "not falling");
         for (size_t i = p->first[a]; i < p->first[a + 1]; i++) {
             if (p->neighbours[i] >= plan->n || p->neighbours[i] == a)
-                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "neighbour", a, (double)p->neighbours[i], (double)plan->n,
-                                        "another particle's number");
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "neighbour", a, (double)p->neighbours[i],
+                                        (double)plan->n, "another particle's number");
             if (!tlsphi_all_finite(p->pair_vectors + 3 * i, (size_t)plan->dim))
                 return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "pair vector", a, (double)i, 0, "finite");
         }
@@ -1260,22 +1311,30 @@ static void tlsphi_inverse(int n, const double A[9], double out[9]) {
     const double c00 = A[4] * A[8] - A[5] * A[7], c01 = A[5] * A[6] - A[3] * A[8], c02 = A[3] * A[7] - A[4] * A[6];
     const double det = A[0] * c00 + A[1] * c01 + A[2] * c02;
     double inverse[9];
-    inverse[0] = c00; inverse[1] = A[2] * A[7] - A[1] * A[8]; inverse[2] = A[1] * A[5] - A[2] * A[4];
-    inverse[3] = c01; inverse[4] = A[0] * A[8] - A[2] * A[6]; inverse[5] = A[2] * A[3] - A[0] * A[5];
-    inverse[6] = c02; inverse[7] = A[1] * A[6] - A[0] * A[7]; inverse[8] = A[0] * A[4] - A[1] * A[3];
+    inverse[0] = c00;
+    inverse[1] = A[2] * A[7] - A[1] * A[8];
+    inverse[2] = A[1] * A[5] - A[2] * A[4];
+    inverse[3] = c01;
+    inverse[4] = A[0] * A[8] - A[2] * A[6];
+    inverse[5] = A[2] * A[3] - A[0] * A[5];
+    inverse[6] = c02;
+    inverse[7] = A[1] * A[6] - A[0] * A[7];
+    inverse[8] = A[0] * A[4] - A[1] * A[3];
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) out[i * n + j] = inverse[3 * i + j] / det;
 }
 
 /* sum_b g_ab (x) d_ab / 2, padded to 3x3: for kernels w_a L_a^-1, for closed operators V_a I. */
-static tlsph_result tlsphi_moment(tlsphi_plan *plan, size_t a, const uint32_t *list, const double *g, size_t count, double A[9]) {
+static tlsph_result tlsphi_moment(tlsphi_plan *plan, size_t a, const uint32_t *list, const double *g, size_t count,
+                                  double A[9]) {
     for (int i = 0; i < 9; i++) A[i] = 0;
     if (plan->dim == 2) A[8] = 1;
     for (size_t i = 0; i < count; i++) {
         double d[3] = {0, 0, 0};
         tlsphi_difference(plan, a, list[i], d);
         if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= 1e-18 * plan->h * plan->h)
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_DUPLICATE, "same place as particle", a, (double)list[i], 0, "distinct positions");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_DUPLICATE, "same place as particle", a, (double)list[i], 0,
+                                    "distinct positions");
         for (int k = 0; k < plan->dim; k++)
             for (int l = 0; l < plan->dim; l++) A[3 * k + l] += 0.5 * g[(size_t)plan->dim * i + (size_t)k] * d[l];
     }
@@ -1309,10 +1368,11 @@ static uint32_t tlsphi_root(uint32_t *parent, uint32_t a) {
 static void tlsphi_join(uint32_t *parent, uint32_t a, uint32_t b) {
     a = tlsphi_root(parent, a);
     b = tlsphi_root(parent, b);
-    if (a < b) parent[b] = a; else parent[a] = b;
+    if (a < b) parent[b] = a;
+    else parent[a] = b;
 }
 
-/* Goes once over all particles: counts neighbours, builds M_a, joins bodies. list and g hold the largest neighbourhood. */
+/* Goes once over all particles: builds M_a, joins bodies. list and g hold the largest neighbourhood. */
 static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t *list, double *g) {
     for (size_t a = 0; a < plan->n; a++) {
         double A[9];
@@ -1330,8 +1390,8 @@ static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t 
                 worst = tlsphi_dmax(worst, fabs(A[3 * i + j] - (i == j ? V : 0)));
             }
             if (!(worst <= (TLSPHI_EPSILON > 1e-10 ? 1e-3 : 1e-6) * V))
-                return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "defect of sum C (x) d / 2 = V I over V", a, worst / V, 1e-6,
-                                        "pair vectors that are exact for linear fields");
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "defect of sum C (x) d / 2 = V I over V", a,
+                                        worst / V, 1e-6, "pair vectors that are exact for linear fields");
         }
         for (size_t i = 0; i < count; i++) tlsphi_join(parent, (uint32_t)a, list[i]);
     }
@@ -1406,7 +1466,7 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
    and one volumetric energy u(J) = k/2 (J - 1)^2:
      neo-Hookean, Mie-Grueneisen   e_R = psi + u + beta theta_R (J - 1)      eta_R = beta (J^q - 1)/q
      modified entropic elasticity  e_R = beta theta_R (J - 1)                eta_R = (e_R - psi - u)/theta_R
-     linear                        psi = mu dev(eps):dev(eps), H = I, J = 1 + tr eps; the rest as Mie-Grueneisen with q = 1
+     linear                        psi = mu dev(eps):dev(eps), H = I, J = 1 + tr eps; else Mie-Grueneisen with q = 1
    with beta = c_v Gamma_0 = 3 kappa alpha and k = kappa - beta theta_R (1 - q) (Mie-Grueneisen) or kappa (000-29, 32).
 
    THE J EQUATION (default, TLSPH_SPLIT). If J is evolved, psi sees F and det F only, u and the thermal terms see J, and
@@ -1417,10 +1477,10 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
 /* A material's constants as the loops want them. */
 typedef struct tlsphi_material {
     tlsph_material_kind kind;
-    int entropic;                            /* MEE: psi and u sit in the entropy */
-    tlsph_real rho, c_v, theta_R, h;         /* kg/m^3, J/(m^3 K), K, W/(m K) */
-    tlsph_real zeta, gamma, k, beta, q;      /* Pa, Pa, Pa, Pa/K, 1 */
-    tlsph_real mu, kappa;                    /* Pa */
+    int entropic;                       /* MEE: psi and u sit in the entropy */
+    tlsph_real rho, c_v, theta_R, h;    /* kg/m^3, J/(m^3 K), K, W/(m K) */
+    tlsph_real zeta, gamma, k, beta, q; /* Pa, Pa, Pa, Pa/K, 1 */
+    tlsph_real mu, kappa;               /* Pa */
     tlsph_response_fn response;
     void *user;
 } tlsphi_material;
@@ -1447,7 +1507,9 @@ static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
 }
 
 /* The deviatoric energy and its derivatives: Sigma_F = a F, Sigma_H = b H, dpsi/dJ = c. */
-typedef struct tlsphi_deviator { tlsph_real psi, a, b, c; } tlsphi_deviator;
+typedef struct tlsphi_deviator {
+    tlsph_real psi, a, b, c;
+} tlsphi_deviator;
 
 TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_real I1, tlsph_real I2, tlsph_real J) {
     tlsphi_deviator out;
@@ -1468,21 +1530,27 @@ TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_
 /* Upper bound of the largest eigenvalue of the acoustic tensor of psi + u over all directions, Pa.
    For a direction N put f = F N, h = H N (then f.h = J) and r = H H^T h. The acoustic tensor is
      2 zeta J^-2/3 [I - 2/(3J) (f h + h f) + 5 I1/(9J^2) h h] + k h h
-     + 3 gamma J^-2 sqrt(I2) S + 3 gamma J^-4/sqrt(I2) [(I2 h + r)(I2 h + r) - 2 I2^2 h h],   S = the form |F x (m (x) N)|^2.
+     + 3 gamma J^-2 sqrt(I2) S + 3 gamma J^-4/sqrt(I2) [(I2 h + r)(I2 h + r) - 2 I2^2 h h],
+   where S is the form |F x (m (x) N)|^2 of m.
    In the basis (h/|h|, across) each entry is bounded by the largest and smallest principal stretches, which follow from
    the invariants; the 2x2 eigenvalue is then a bound. It is exact at F = I, where dropping the mixed terms would give
    kappa + 8/3 mu instead of kappa + 4/3 mu. */
-typedef struct tlsphi_invariants { tlsph_real I1, I2, J, L1, LH, l3; } tlsphi_invariants; /* largest of F^T F, of H^T H; least of F^T F */
+typedef struct tlsphi_invariants {
+    tlsph_real I1, I2, J, L1, LH, l3;
+} tlsphi_invariants; /* largest of F^T F, of H^T H; least of F^T F */
 
 TLSPHI_INLINE tlsphi_invariants tlsphi_principal_bounds(tlsph_real I1, tlsph_real I2, tlsph_real J) {
     tlsphi_invariants s;
-    s.I1 = I1; s.I2 = I2; s.J = J;
-    s.L1 = tlsphi_largest_bound(I1, I1 * I1 - 2 * I2);           /* tr C^2 = I1^2 - 2 I2 */
-    s.LH = tlsphi_largest_bound(I2, I2 * I2 - 2 * J * J * I1);   /* the same for cof C */
+    s.I1 = I1;
+    s.I2 = I2;
+    s.J = J;
+    s.L1 = tlsphi_largest_bound(I1, I1 * I1 - 2 * I2);         /* tr C^2 = I1^2 - 2 I2 */
+    s.LH = tlsphi_largest_bound(I2, I2 * I2 - 2 * J * J * I1); /* the same for cof C */
     s.l3 = J * J / s.LH;
     return s;
 }
-static tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s) {
+static tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev,
+                                        const tlsphi_invariants *s) {
     const tlsph_real ratio = tlsphi_sqrt(s->L1 * s->LH) / s->J; /* largest over least stretch */
     tlsph_real along = dev->a * (5 * s->I1 * s->LH / (9 * s->J * s->J) - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
     tlsph_real across = dev->a, mixed = dev->a * (ratio - 1 / ratio) / 3;
@@ -1499,7 +1567,8 @@ static tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_d
 }
 /* MEE: bound of |d eta_R/dF N|^2, by which coupling stiffens the isentropic wave. With the vectors above,
    d eta_R/dF N = (beta theta_R h - P_psi N)/theta_R = c_h h + c_f f + c_r r. */
-static tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s) {
+static tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsphi_deviator *dev,
+                                           const tlsphi_invariants *s) {
     const tlsph_real mooney = dev->b * s->I2 / s->J; /* 3 gamma J^-3 I2^3/2 */
     const tlsph_real volumetric = m->k * (s->J - 1) - dev->a * s->I1 / (3 * s->J) + mooney / 3;
     const tlsph_real c_h = m->beta - volumetric / m->theta_R, c_f = -dev->a / m->theta_R;
@@ -1525,7 +1594,7 @@ static void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, 
         out->s_modulus[1] = shear / m->theta_R;
         return;
     }
-    const tlsph_real power = m->q == 1 ? 1 : tlsphi_pow(s->J, m->q - 1), gruneisen = m->beta * power; /* -deta_R/dJ sign dropped */
+    const tlsph_real power = m->q == 1 ? 1 : tlsphi_pow(s->J, m->q - 1), gruneisen = m->beta * power; /* d eta_R/dJ */
     tlsph_real thermal = m->beta * (1 - m->q) * power / s->J;
     if (coupled && m->beta != 0) thermal += gruneisen * gruneisen / m->c_v;
     out->p_modulus[0] = elastic;
@@ -1535,8 +1604,8 @@ static void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, 
 }
 
 /* Linear material: psi = mu dev(eps):dev(eps). */
-static void tlsphi_respond_linear(const tlsphi_material *m, const tlsph_real *F, tlsph_real J, int coupled, tlsph_response *out,
-                                  tlsphi_deviator *dev) {
+static void tlsphi_respond_linear(const tlsphi_material *m, const tlsph_real *F, tlsph_real J, int coupled,
+                                  tlsph_response *out, tlsphi_deviator *dev) {
     const tlsph_real third = (F[0] + F[4] + F[8]) / 3 - 1;
     tlsph_real square = 0;
     for (int i = 0; i < 3; i++)
@@ -1560,9 +1629,12 @@ static void tlsphi_respond_linear(const tlsphi_material *m, const tlsph_real *F,
 
 /* The built-in laws at F with deviatoric arguments (H, Jd) and volumetric argument J. e_F holds the whole deviatoric
    part a F + b H x F + c H (for MEE it is -theta_R eta_F). `dev` returns a, b, c for conjugates. */
-static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H, tlsph_real Jd, tlsph_real J,
-                           int coupled, tlsph_response *out, tlsphi_deviator *dev) {
-    if (m->kind == TLSPH_LINEAR) { tlsphi_respond_linear(m, F, J, coupled, out, dev); return; }
+static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H, tlsph_real Jd,
+                           tlsph_real J, int coupled, tlsph_response *out, tlsphi_deviator *dev) {
+    if (m->kind == TLSPH_LINEAR) {
+        tlsphi_respond_linear(m, F, J, coupled, out, dev);
+        return;
+    }
     const tlsph_real I1 = tlsphi_dot(9, F, F), I2 = tlsphi_dot(9, H, H);
     tlsph_real S[9];
     *dev = tlsphi_deviatoric(m, I1, I2, Jd);
@@ -1576,14 +1648,20 @@ static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const 
     if (m->entropic) {
         out->energy = thermal * (J - 1);
         out->entropy = (out->energy - dev->psi - u) / m->theta_R;
-        for (int i = 0; i < 9; i++) { out->e_F[i] = 0; out->eta_F[i] = -S[i] / m->theta_R; }
+        for (int i = 0; i < 9; i++) {
+            out->e_F[i] = 0;
+            out->eta_F[i] = -S[i] / m->theta_R;
+        }
         out->e_J = thermal;
         out->eta_J = m->beta - du / m->theta_R;
     } else {
         const tlsph_real power = m->q == 1 ? J : m->q == 0 ? 1 : tlsphi_pow(J, m->q);
         out->energy = dev->psi + u + thermal * (J - 1);
         out->entropy = m->q == 0 ? (m->beta == 0 ? 0 : m->beta * tlsphi_log(J)) : m->beta * (power - 1) / m->q;
-        for (int i = 0; i < 9; i++) { out->e_F[i] = S[i]; out->eta_F[i] = 0; }
+        for (int i = 0; i < 9; i++) {
+            out->e_F[i] = S[i];
+            out->eta_F[i] = 0;
+        }
         out->e_J = du + thermal;
         out->eta_J = m->beta * power / J;
     }
@@ -1601,7 +1679,13 @@ TLSPHI_INLINE void tlsphi_drift(tlsph_real phi, tlsph_real scale, tlsph_real *W,
 
 /* The first constant out of range, or NULL. */
 static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, double *value, const char **allowed) {
-    const struct { const char *name; tlsph_real value; double low, high; int open_low, open_high; const char *allowed; } range[] = {
+    const struct {
+        const char *name;
+        tlsph_real value;
+        double low, high;
+        int open_low, open_high;
+        const char *allowed;
+    } range[] = {
         {"density", m->density, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
         {"young", m->young, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
         {"poisson", m->poisson, -1, 0.5, 1, 1, "between -1 and 0.5, both excluded"},
@@ -1610,7 +1694,8 @@ static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, d
         {"reference_temperature", m->reference_temperature, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
         {"gruneisen_exponent", m->gruneisen_exponent, 0, 1, 0, 0, "0 to 1"},
         {"mooney_fraction", m->mooney_fraction, 0, 1, 0, 0, "0 to 1"},
-        {"specific_heat", m->specific_heat, 0, TLSPHI_LARGEST, thermal, 1, "more than 0 in thermal scenes, else 0 or more"},
+        {"specific_heat", m->specific_heat, 0, TLSPHI_LARGEST, thermal, 1,
+         "more than 0 in thermal scenes, else 0 or more"},
     };
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++) {
         const double v = (double)range[i].value;
@@ -1644,7 +1729,10 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
     tlsph_response r;
     tlsphi_deviator dev;
     memset(&dev, 0, sizeof dev);
-    if (linear) { tlsphi_identity(H); d = F[0] + F[4] + F[8] - 2; } else tlsph_cofactor(F, H);
+    if (linear) {
+        tlsphi_identity(H);
+        d = F[0] + F[4] + F[8] - 2;
+    } else tlsph_cofactor(F, H);
     if (!(d > 0) && !linear) return TLSPH_ERROR_INVERSION;
     if (m.kind == TLSPH_USER) {
         const uint32_t particle = 0;
@@ -1671,8 +1759,8 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
 }
 
 /* ==== [SOLVER DATA] ================================================================================================
-   All arrays are in the solver's order and lie in one block. D = dimension, DD = D * D. Optional arrays are NULL where the
-   scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
+   All arrays are in the solver's order and lie in one block. D = dimension, DD = D * D. Optional arrays are NULL where
+   the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
    so their value does not depend on the threads. */
 
 #define TLSPHI_BLOCK 128 /* particles a task: small enough for load balance, large enough to hide the call */
@@ -1683,28 +1771,41 @@ typedef struct tlsphi_state {
     tlsph_real *H, *J, *E; /* DD, 1, 1 (E or eta); optional */
 } tlsphi_state;
 
-enum { TLSPHI_SUM_DISSIPATION, TLSPHI_SUM_DISSIPATION_ENTROPY, TLSPHI_SUM_CONDUCTION_ENTROPY, TLSPHI_SUM_LEAST, TLSPHI_SUMS };
+enum {
+    TLSPHI_SUM_DISSIPATION,
+    TLSPHI_SUM_DISSIPATION_ENTROPY,
+    TLSPHI_SUM_CONDUCTION_ENTROPY,
+    TLSPHI_SUM_LEAST,
+    TLSPHI_SUMS
+};
 enum { TLSPHI_MOMENTS = 16 }; /* sums of the projection, see [PROJECTION] */
 
 typedef struct tlsphi_block {
     uint32_t begin, end, body;
-    uint32_t failed;                   /* first bad particle of the block, or TLSPHI_NONE */
+    uint32_t failed; /* first bad particle of the block, or TLSPHI_NONE */
     tlsph_result failure;
-    double time_step;                  /* stable step of its particles, s */
+    double time_step; /* stable step of its particles, s */
     double sums[TLSPHI_SUMS];
     double moments[TLSPHI_MOMENTS];
 } tlsphi_block;
 
-typedef struct tlsphi_mirror { uint32_t particle; int tangent, conducts; tlsph_real N[3]; } tlsphi_mirror;
-typedef struct tlsphi_fix { uint32_t particle; tlsph_real e[3]; } tlsphi_fix;
+typedef struct tlsphi_mirror {
+    uint32_t particle;
+    int tangent, conducts;
+    tlsph_real N[3];
+} tlsphi_mirror;
+typedef struct tlsphi_fix {
+    uint32_t particle;
+    tlsph_real e[3];
+} tlsphi_fix;
 
 typedef struct tlsphi_load {
-    tlsph_condition given;    /* pointers replaced by copies */
-    uint32_t *inner, *host;   /* solver and host numbers */
-    tlsph_real *area;         /* traction, heat flux: 1; pressure: D; else NULL */
-    tlsph_real *values;       /* 3 or 1 a particle, of the current stage */
-    tlsph_real *X, *x;        /* 3 a particle, for the callback; NULL without */
-    tlsph_real *before;       /* driven velocity: kinetic part before the stage, 1 a particle */
+    tlsph_condition given;  /* pointers replaced by copies */
+    uint32_t *inner, *host; /* solver and host numbers */
+    tlsph_real *area;       /* traction, heat flux: 1; pressure: D; else NULL */
+    tlsph_real *values;     /* 3 or 1 a particle, of the current stage */
+    tlsph_real *X, *x;      /* 3 a particle, for the callback; NULL without */
+    tlsph_real *before;     /* driven velocity: kinetic part before the stage, 1 a particle */
 } tlsphi_load;
 
 /* Cumulative entries of the ledger, and the values from which they count. */
@@ -1715,44 +1816,60 @@ typedef struct tlsphi_account {
 } tlsphi_account;
 
 typedef struct tlsphi_body {
-    uint32_t first;                          /* particle */
-    double volume, inertia[9], centre[3];    /* of the stage's positions */
-    double v_mean[3], spin[3];               /* rigid motion nearest to v */
-    double lambda[3], linear[3];             /* multipliers of the projection */
+    uint32_t first;                       /* particle */
+    double volume, inertia[9], centre[3]; /* of the stage's positions */
+    double v_mean[3], spin[3];            /* rigid motion nearest to v */
+    double lambda[3], linear[3];          /* multipliers of the projection */
 } tlsphi_body;
 
 struct tlsph_solver {
-    int dim, thermal, has_H, has_J, sharp, corrected, mirrored, conducts, has_user, audit, projection, dissipation_heats, threads;
+    int dim, thermal, has_H, has_J, sharp, corrected, conducts, has_user, audit, projection, dissipation_heats, threads;
     tlsph_dissipation dissipation;
     tlsph_volume_coupling coupling;
     tlsph_conduction conduction;
     tlsph_real drift_stiffness, drift_scale, jump_share, drift_relaxation, cfl;
     size_t n, pairs, blocks, bodies, fixes, mirrors, loads;
-    tlsphi_material *materials; size_t material_count;
-    uint8_t *material_of;                          /* NULL: one material */
+    tlsphi_material *materials;
+    size_t material_count;
+    uint8_t *material_of; /* NULL: one material */
     /* operator */
-    size_t *first; uint32_t *neighbour; tlsph_real *g, *M;
+    size_t *first;
+    uint32_t *neighbour;
+    tlsph_real *g, *M;
     tlsph_real *X, *V, *B, *tau;
     uint32_t *host, *inner;
     /* state, and the state at the beginning of the step */
-    tlsphi_state now, old; tlsph_real *now_memory, *old_memory; size_t state_reals;
+    tlsphi_state now, old;
+    tlsph_real *now_memory, *old_memory;
+    size_t state_reals;
     /* rates per reference volume */
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
     /* what neighbours read: velocity, P M, A = H M, (c_p, c_s, rho, drift ratio), Sigma_J and its gradient,
        temperature and its gradient, M^T Q/theta, h/J; w is v without the body's rigid motion, as the dissipation sees it
-       (without projection w and grad_w are v and grad_v). With sharp gradients rate_F and P_flux differ from grad_v and PM */
+       (without projection w and grad_w are v and grad_v). Without sharp gradients rate_F and P_flux are grad_v and PM */
     tlsph_real *w, *grad_w, *v, *grad_v, *P_flux, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
     /* conditions */
-    tlsphi_fix *fix; tlsphi_mirror *mirror; uint32_t *mirror_of; tlsphi_load *load;
-    tlsphi_block *block; tlsphi_body *body;
+    tlsphi_fix *fix;
+    tlsphi_mirror *mirror;
+    uint32_t *mirror_of;
+    tlsphi_load *load;
+    tlsphi_block *block;
+    tlsphi_body *body;
     /* time and balances */
-    double time; uint64_t step; double last_dt, first_dt; uint64_t fingerprint;
+    double time;
+    uint64_t step;
+    double last_dt, first_dt;
+    uint64_t fingerprint;
     tlsphi_account account, account_old;
     tlsph_error error;
     tlsph_size size;
     /* threads and memory */
-    tlsph_run_fn run; void *run_user;
-    tlsph_allocator allocator; void *memory; size_t memory_size; int owns_memory;
+    tlsph_run_fn run;
+    void *run_user;
+    tlsph_allocator allocator;
+    void *memory;
+    size_t memory_size;
+    int owns_memory;
 };
 
 TLSPHI_INLINE const tlsphi_material *tlsphi_material_of(const tlsph_solver *s, size_t a) {
@@ -1762,7 +1879,10 @@ TLSPHI_INLINE const tlsphi_material *tlsphi_material_of(const tlsph_solver *s, s
 /* Runs task(arg, i) for every block i: on the host's threads, with OpenMP, or serially. */
 static void tlsphi_run_tasks(const tlsph_solver *s, tlsph_task_fn task, void *arg) {
     const long count = (long)s->blocks;
-    if (s->run) { s->run(s->run_user, task, arg, s->blocks); return; }
+    if (s->run) {
+        s->run(s->run_user, task, arg, s->blocks);
+        return;
+    }
 #ifdef _OPENMP
     if (s->threads > 0) {
 #pragma omp parallel for schedule(static) num_threads(s->threads)
@@ -1776,7 +1896,10 @@ static void tlsphi_run_tasks(const tlsph_solver *s, tlsph_task_fn task, void *ar
 
 /* The same for a function of a block. */
 typedef void (*tlsphi_block_fn)(tlsph_solver *s, tlsphi_block *block);
-typedef struct tlsphi_phase { tlsph_solver *s; tlsphi_block_fn fn; } tlsphi_phase;
+typedef struct tlsphi_phase {
+    tlsph_solver *s;
+    tlsphi_block_fn fn;
+} tlsphi_phase;
 
 static void tlsphi_phase_task(void *arg, size_t i) {
     const tlsphi_phase *phase = (const tlsphi_phase *)arg;
@@ -1799,14 +1922,15 @@ static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * 
 /* -- the state of one particle, evaluated: Algorithm 1 lines (8), (9) -- */
 
 typedef struct tlsphi_point {
-    tlsph_real F[9], H[9], d, J;  /* d = det F (linear: 1 + tr eps) */
-    tlsph_response r;             /* with W inside */
+    tlsph_real F[9], H[9], d, J; /* d = det F (linear: 1 + tr eps) */
+    tlsph_response r;            /* with W inside */
     tlsphi_deviator dev;
     tlsph_real kinetic, theta, p, P[9], Sigma_J, c_p, c_s, drift_ratio;
 } tlsphi_point;
 
 /* Loads F, H and J as 3x3; where H or J are not evolved they follow from F. */
-static void tlsphi_load_measures(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a, tlsphi_point *pt) {
+static void tlsphi_load_measures(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a,
+                                 tlsphi_point *pt) {
     const int dim = s->dim;
     const size_t dd = (size_t)(dim * dim);
     tlsphi_expand(dim, u->F + dd * a, 1, pt->F);
@@ -1832,7 +1956,8 @@ static tlsph_real tlsphi_add_drift(const tlsph_solver *s, const tlsphi_material 
     return stiffness * dW;
 }
 
-static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a, const tlsphi_point *pt) {
+static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a,
+                                     const tlsphi_point *pt) {
     if (s->thermal == TLSPH_ENERGY) return m->theta_R + (u->E[a] - pt->kinetic - pt->r.energy) / m->c_v;
     if (s->thermal == TLSPH_ENTROPY) return m->theta_R * tlsphi_exp((u->E[a] - pt->r.entropy) / m->c_v);
     return m->theta_R;
@@ -1840,7 +1965,8 @@ static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *
 
 /* Sets F, H, J, response: all that does not need the temperature. `user`: response of a user's material, if evaluated
    already. Returns TLSPH_OK, NOT_FINITE or INVERSION. */
-static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state *u, size_t a, const tlsph_response *user, tlsphi_point *pt) {
+static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state *u, size_t a,
+                                      const tlsph_response *user, tlsphi_point *pt) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const int dim = s->dim, joint = s->coupling == TLSPH_JOINT_AS_PRINTED;
     tlsphi_load_measures(s, u, m, a, pt);
@@ -1864,7 +1990,8 @@ static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state 
 }
 
 /* Everything at a particle. */
-static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state *u, size_t a, const tlsph_response *user, tlsphi_point *pt) {
+static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state *u, size_t a,
+                                      const tlsph_response *user, tlsphi_point *pt) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const tlsph_result result = tlsphi_respond_at(s, u, a, user, pt);
     if (result) return result;
@@ -1876,7 +2003,8 @@ static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state 
     pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta / m->theta_R : 1);
     pt->c_p = tlsphi_sqrt(tlsphi_max(pt->r.p_modulus[0] + theta * pt->r.p_modulus[1], 0) / m->rho);
     pt->c_s = tlsphi_sqrt(tlsphi_max(pt->r.s_modulus[0] + theta * pt->r.s_modulus[1], 0) / m->rho);
-    return tlsphi_all_finite(pt->P, 9) && tlsphi_finite(pt->kinetic) && tlsphi_finite(pt->c_p) ? TLSPH_OK : TLSPH_ERROR_NOT_FINITE;
+    return tlsphi_all_finite(pt->P, 9) && tlsphi_finite(pt->kinetic) && tlsphi_finite(pt->c_p) ? TLSPH_OK
+                                                                                               : TLSPH_ERROR_NOT_FINITE;
 }
 
 /* One callback for the run of particles [begin, end) that share a user's material. */
@@ -1923,7 +2051,8 @@ static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi
     if (s->conducts && m->h > 0) {
         tlsph_real HtH[9];
         for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) HtH[3 * i + j] = pt->H[i] * pt->H[j] + pt->H[3 + i] * pt->H[3 + j] + pt->H[6 + i] * pt->H[6 + j];
+            for (int j = 0; j < 3; j++)
+                HtH[3 * i + j] = pt->H[i] * pt->H[j] + pt->H[3 + i] * pt->H[3 + j] + pt->H[6 + i] * pt->H[6 + j];
         const tlsph_real K = m->h / pt->J * tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
         dt = tlsphi_dmin(dt, 0.8 * (double)m->c_v * tau * tau / (2 * s->dim * (double)K));
     }
@@ -1938,7 +2067,8 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     tlsph_real P[9], H[9];
     tlsphi_shrink(dim, pt->P, P);
     tlsphi_shrink(dim, pt->H, H);
-    for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++) tlsphi_mirror_tensor(dim, mirror, P);
+    for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++)
+        tlsphi_mirror_tensor(dim, mirror, P);
     if (s->M) {
         tlsphi_product(dim, P, s->M + dd * a, s->PM + dd * a);
         tlsphi_product(dim, H, s->M + dd * a, s->A + dd * a);
@@ -1985,8 +2115,8 @@ static const tlsphi_block *tlsphi_evaluate(tlsph_solver *s) {
 }
 
 /* ==== [DISSIPATION] ================================================================================================
-   The jump of v between two particles is damped along n = c/|c| with the p speed and across with the s speed (000-73, 74).
-   Raw jumps are first order. Reconstruction takes the linear part away: with d = X_b - X_a,
+   The jump of v between two particles is damped along n = c/|c| with the p speed and across with the s speed
+   (000-73, 74). Raw jumps are first order. Reconstruction takes the linear part away: with d = X_b - X_a,
      Dr = Dv - (grad v_a + grad v_b)/2 d,
    which is third order in smooth flow. Then D_p . Dv >= 0 no longer holds by itself; the limiter drops the normal or the
    tangential part where it would be negative. Energy goes with it without division by temperature differences:
@@ -1998,13 +2128,16 @@ static const tlsphi_block *tlsphi_evaluate(tlsph_solver *s) {
    push it on again, and the heat in between would come from nowhere. So v stands here for the velocity w that remains
    when the rigid motion of the body is taken away (see [PROJECTION]). A turning frame then changes nothing. */
 
-#define TLSPHI_FRONT_LOW 0.0015 /* approach over p speed from which a pair may be a front; full strength at twice this */
-#define TLSPHI_FRONT_GAIN 4     /* measured on symmetric impacts at 0.1 and 0.3 c_p: overshoot 2 to 3 %, 25 to 45 % without */
+#define TLSPHI_FRONT_LOW                                                                                               \
+    0.0015 /* approach over p speed from which a pair may be a front; full strength at twice this */
+#define TLSPHI_FRONT_GAIN                                                                                              \
+    4 /* measured on symmetric impacts at 0.1 and 0.3 c_p: overshoot 2 to 3 %, 25 to 45 % without */
 
-/* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; front in [0, 1] gives the normal part of
-   the raw jump back. */
-TLSPHI_INLINE void tlsphi_damp_velocity(int dim, int kind, const tlsph_real *Dv, const tlsph_real *Dr, const tlsph_real *n, tlsph_real front,
-                                        tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real *D_p) {
+/* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; front in [0, 1] gives the normal part
+   of the raw jump back. */
+TLSPHI_INLINE void tlsphi_damp_velocity(int dim, int kind, const tlsph_real *Dv, const tlsph_real *Dr,
+                                        const tlsph_real *n, tlsph_real front, tlsph_real half_impedance,
+                                        tlsph_real c_p, tlsph_real c_s, tlsph_real *D_p) {
     const tlsph_real *jump = kind == TLSPH_FIRST_ORDER || kind == TLSPH_AS_PRINTED ? Dv : Dr;
     tlsph_real normal = tlsphi_dot(dim, n, jump), tangent[3];
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) tangent[i] = jump[i] - normal * n[i];
@@ -2030,9 +2163,9 @@ TLSPHI_INLINE tlsph_real tlsphi_damped_jump(int kind, tlsph_real D, tlsph_real D
 
 /* Fronts. Behind a shock Dr is small although one of the two gradients belongs to the other side: reconstruction alone
    overshoots. `front` in [0, 1] tells how much of the raw jump is put back. It needs two things: the particles approach
-   each other by more than TLSPHI_FRONT_LOW of the p speed (raw < 0), and the jumps of the far sides, 2 slope - raw, are unlike raw.
-   For rho = far/raw the van Albada function phi = rho (rho + 1)/(rho^2 + 1) is 1 +- O(h) in smooth flow and 0 at the foot
-   of a front, so front is O(h^2) where there is none, and exactly 0 in gentle flow. */
+   each other by more than TLSPHI_FRONT_LOW of the p speed (raw < 0), and the jumps of the far sides, 2 slope - raw, are
+   unlike raw. For rho = far/raw the van Albada function phi = rho (rho + 1)/(rho^2 + 1) is 1 +- O(h) in smooth flow and
+   0 at the foot of a front, so front is O(h^2) where there is none, and exactly 0 in gentle flow. */
 static tlsph_real tlsphi_smoothness(tlsph_real raw, tlsph_real slope) {
     const tlsph_real rho = 2 * slope / raw - 1;
     return tlsphi_max(0, tlsphi_min(1, rho * (rho + 1) / (rho * rho + 1)));
@@ -2043,13 +2176,15 @@ static tlsph_real tlsphi_front(tlsph_real raw, tlsph_real slope_a, tlsph_real sl
     return strength * tlsphi_min(1, TLSPHI_R(TLSPHI_FRONT_GAIN) * rough * rough);
 }
 /* S_J (000-73) times the share a_J, weakened where the drift potential is stiff; cc = |c|^2, CC = |C|. */
-TLSPHI_INLINE tlsph_real tlsphi_jacobian_factor(tlsph_real a_J, tlsph_real cc, tlsph_real CC, tlsph_real rho, tlsph_real c_p, tlsph_real mean_ratio) {
+TLSPHI_INLINE tlsph_real tlsphi_jacobian_factor(tlsph_real a_J, tlsph_real cc, tlsph_real CC, tlsph_real rho,
+                                                tlsph_real c_p, tlsph_real mean_ratio) {
     return a_J * cc / (2 * rho * c_p * CC * (1 + mean_ratio));
 }
 
 /* (66) and (76), with x/(x^2 + 1e-12) for 1/x where the temperatures meet. */
 static void tlsphi_dissipation_as_printed(const tlsph_pair_side *a, const tlsph_pair_side *b, const tlsph_real n[3],
-                                          tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real S_J, tlsph_pair_flux *out) {
+                                          tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real S_J,
+                                          tlsph_pair_flux *out) {
     const tlsph_real Xa = a->theta / a->theta_R, Xb = b->theta / b->theta_R, x = 1 / Xa - 1 / Xb;
     tlsph_real jump[3], Dv[3], D_v[3];
     for (int i = 0; i < 3; i++) {
@@ -2067,8 +2202,8 @@ static void tlsphi_dissipation_as_printed(const tlsph_pair_side *a, const tlsph_
 }
 
 TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_side *a, const tlsph_pair_side *b,
-                                       const tlsph_real C[3], const tlsph_real c[3], const tlsph_real d[3], tlsph_real a_J,
-                                       tlsph_pair_flux *out) {
+                                       const tlsph_real C[3], const tlsph_real c[3], const tlsph_real d[3],
+                                       tlsph_real a_J, tlsph_pair_flux *out) {
     const tlsph_real cc = tlsphi_dot(3, c, c), CC = tlsphi_sqrt(tlsphi_dot(3, C, C)), length = tlsphi_sqrt(cc);
     const tlsph_real rho = (a->density + b->density) / 2, c_p = (a->c_p + b->c_p) / 2, c_s = (a->c_s + b->c_s) / 2;
     tlsph_real n[3], Dv[3], Dr[3];
@@ -2078,7 +2213,8 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
     for (int i = 0; i < 3; i++) {
         n[i] = c[i] / length;
         Dv[i] = b->velocity[i] - a->velocity[i];
-        Dr[i] = Dv[i] - (tlsphi_dot(3, a->velocity_gradient + 3 * i, d) + tlsphi_dot(3, b->velocity_gradient + 3 * i, d)) / 2;
+        Dr[i] = Dv[i] -
+                (tlsphi_dot(3, a->velocity_gradient + 3 * i, d) + tlsphi_dot(3, b->velocity_gradient + 3 * i, d)) / 2;
     }
     if (kind == TLSPH_AS_PRINTED) {
         tlsphi_dissipation_as_printed(a, b, n, rho * CC / 2, c_p, c_s, S_J, out);
@@ -2105,15 +2241,18 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
    grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) g_ab M_a^T (000-53), for v and, where needed, Sigma_J and theta. */
 
 /* Corrects and stores a raw sum: out = G M^T. */
-TLSPHI_INLINE void tlsphi_store_gradient(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *G, tlsph_real *out) {
+TLSPHI_INLINE void tlsphi_store_gradient(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *G,
+                                         tlsph_real *out) {
     if (s->M) tlsphi_product_transposed(dim, G, s->M + (size_t)(dim * dim) * a, out);
     else memcpy(out, G, (size_t)(dim * dim) * sizeof *G);
 }
-TLSPHI_INLINE void tlsphi_store_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad, tlsph_real *out) {
+TLSPHI_INLINE void tlsphi_store_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
+                                      tlsph_real *out) {
     if (s->M) tlsphi_multiply(dim, s->M + (size_t)(dim * dim) * a, grad, out);
     else memcpy(out, grad, (size_t)dim * sizeof *grad);
 }
-TLSPHI_INLINE void tlsphi_gradient_particle(const tlsph_solver *s, size_t a, const int dim, const int with_w, const int with_S, const int with_theta) {
+TLSPHI_INLINE void tlsphi_gradient_particle(const tlsph_solver *s, size_t a, const int dim, const int with_w,
+                                            const int with_S, const int with_theta) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *v_a = s->v + D * a, *w_a = s->w + D * a, half = 1 / (2 * s->V[a]);
     tlsph_real G[9] = {0}, Gw[9] = {0}, gS[3] = {0}, gT[3] = {0};
@@ -2131,7 +2270,7 @@ TLSPHI_INLINE void tlsphi_gradient_particle(const tlsph_solver *s, size_t a, con
         if (with_S) TLSPHI_UNROLL for (int i = 0; i < dim; i++) gS[i] += (s->S[b] - s->S[a]) * g[i];
         if (with_theta) TLSPHI_UNROLL for (int i = 0; i < dim; i++) gT[i] += (s->theta[b] - s->theta[a]) * g[i];
     }
-    /* E without its kinetic part changes by P : grad w (see [PROJECTION]); PM : (raw sum) is exactly the adjoint of T_a */
+    /* E without its kinetic part changes by P : grad w (see [PROJECTION]); PM : (raw sum) is the adjoint of T_a */
     if (s->rate_E) s->rate_E[a] = tlsphi_dot(dim * dim, s->PM + dd * a, with_w ? Gw : G);
     tlsphi_store_gradient(s, a, dim, G, s->grad_v + dd * a);
     if (with_w) tlsphi_store_gradient(s, a, dim, Gw, s->grad_w + dd * a);
@@ -2178,7 +2317,8 @@ static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
 }
 
 /* One instance for each combination that a scene may have: the pair loop itself has no branch. */
-TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, const int dim, int with_w, int with_S, int with_theta) {
+TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, const int dim, int with_w, int with_S,
+                                            int with_theta) {
     switch ((with_w ? 4 : 0) + (with_S ? 2 : 0) + (with_theta ? 1 : 0)) {
     case 0: tlsphi_gradient_particle(s, a, dim, 0, 0, 0); break;
     case 1: tlsphi_gradient_particle(s, a, dim, 0, 0, 1); break;
@@ -2211,23 +2351,27 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
 #define TLSPHI_SHARP_FREQUENCY 1.37
 
 /* correction: sum_b ((g_b - g_a) d) (x) C_ab;  moment: sum_b ((P_a - P_b) C_ab) (x) d */
-TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad, tlsph_real *correction, tlsph_real *moment) {
+TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
+                                     tlsph_real *correction, tlsph_real *moment) {
     const size_t D = (size_t)dim, dd = D * D;
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
         tlsph_real d[3], change[9], jump[3];
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
-        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) change[i] = grad[dd * b + (size_t)i] - grad[dd * a + (size_t)i];
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) change[i] =
+            grad[dd * b + (size_t)i] - grad[dd * a + (size_t)i];
         tlsphi_multiply(dim, change, d, jump);
         tlsphi_add_outer(dim, correction, jump, s->g + D * k);
         if (!moment) continue;
-        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) change[i] = s->PM[dd * a + (size_t)i] - s->PM[dd * b + (size_t)i];
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) change[i] =
+            s->PM[dd * a + (size_t)i] - s->PM[dd * b + (size_t)i];
         tlsphi_multiply(dim, change, s->g + D * k, jump);
         tlsphi_add_outer(dim, moment, jump, d);
     }
 }
 static void tlsphi_mirror_all(const tlsph_solver *s, size_t a, tlsph_real *G) {
-    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) tlsphi_mirror_tensor(s->dim, m, G);
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
+        tlsphi_mirror_tensor(s->dim, m, G);
 }
 TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int dim) {
     const size_t dd = (size_t)(dim * dim);
@@ -2242,7 +2386,8 @@ TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int 
     }
     if (s->rate_J) tlsphi_jacobian_rate(s, a);
     if (!s->rate_E) return;
-    if (s->projection) tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL); /* PM is mirrored, so `relative` need not be */
+    if (s->projection)
+        tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL); /* PM is mirrored, so `relative` need not be */
     s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, s->PM + dd * a, s->projection ? relative : correction);
 }
 static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
@@ -2254,18 +2399,21 @@ static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
 
 /* ==== [FLUXES] =====================================================================================================
    One gather over the neighbours: stress, numerical dissipation and heat. The power of the stresses needs no pairs: the
-   flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total is
-   conserved to round-off because force and gradient are adjoint. The dimension, J, the thermal unknown
+   flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
+   is conserved to round-off because force and gradient are adjoint. The dimension, J, the thermal unknown
    and `plain` (default dissipation, antisymmetric C, no audit) are constants of each instance below, so that the pair
    loop has no branch that could be decided beforehand. */
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
-typedef struct tlsphi_gathered { tlsph_real T[3], J, heat, production, conduction, source; double least; } tlsphi_gathered;
+typedef struct tlsphi_gathered {
+    tlsph_real T[3], J, heat, production, conduction, source;
+    double least;
+} tlsphi_gathered;
 
 /* Fluxes of the default forms for one pair. dim, with_J, thermal are constants after inlining. */
-TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C, const tlsph_real *c,
-                                         const int dim, const int with_J, const int thermal, const int kind, tlsphi_gathered *sum,
-                                         tlsph_real *production) {
+TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C,
+                                         const tlsph_real *c, const int dim, const int with_J, const int thermal,
+                                         const int kind, tlsphi_gathered *sum, tlsph_real *production) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *w_a = s->wave + 4 * a, *w_b = s->wave + 4 * b, *v_a = s->w + D * a, *v_b = s->w + D * b;
     const tlsph_real *G_a = s->grad_w + dd * a, *G_b = s->grad_w + dd * b;
@@ -2291,7 +2439,8 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t
     if (with_J) {
         DS = s->S[b] - s->S[a];
         const tlsph_real slope = (tlsphi_dot(dim, s->grad_S + D * a, d) + tlsphi_dot(dim, s->grad_S + D * b, d)) / 2;
-        D_J = tlsphi_jacobian_factor(s->jump_share, cc, CC, rho, c_p, (w_a[3] + w_b[3]) / 2) * tlsphi_damped_jump(kind, DS, DS - slope, front);
+        D_J = tlsphi_jacobian_factor(s->jump_share, cc, CC, rho, c_p, (w_a[3] + w_b[3]) / 2) *
+              tlsphi_damped_jump(kind, DS, DS - slope, front);
         sum->J += D_J;
     }
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += D_p[i];
@@ -2319,17 +2468,20 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
         if (s->S) side[i].Sigma_J = s->S[q];
         for (int k = 0; k < dim; k++) side[i].velocity[k] = s->w[D * q + (size_t)k];
     }
-    for (int k = 0; k < dim; k++) { C3[k] = C[k]; c3[k] = c[k]; }
-    tlsph_pair_dissipation(s->thermal == TLSPH_ENERGY ? TLSPH_AS_PRINTED : TLSPH_FIRST_ORDER, &side[0], &side[1], C3, c3, d,
-                           s->S ? s->jump_share : 0, &flux);
+    for (int k = 0; k < dim; k++) {
+        C3[k] = C[k];
+        c3[k] = c[k];
+    }
+    tlsph_pair_dissipation(s->thermal == TLSPH_ENERGY ? TLSPH_AS_PRINTED : TLSPH_FIRST_ORDER, &side[0], &side[1], C3,
+                           c3, d, s->S ? s->jump_share : 0, &flux);
     for (int k = 0; k < dim; k++) sum->T[k] += flux.D_p[k];
     sum->J += flux.D_J;
     if (s->thermal == TLSPH_ENERGY) sum->heat += flux.D_E - tlsphi_dot(3, side[0].velocity, flux.D_p);
     *production = flux.production;
 }
 
-/* Heat of one pair. The double-gradient flux of (54e), (57), whose production is Q.grad theta/theta^2 exactly, and in the
-   compact form the difference between the two-point flux k (theta_b - theta_a) and its value from the gradients. On an
+/* Heat of one pair. The double-gradient flux of (54e), (57), whose production is Q.grad theta/theta^2 exactly, and in
+   the compact form the difference between the two-point flux k (theta_b - theta_a) and its value from the gradients. On an
    undeformed lattice the sum is the two-point flux, under shear the mixed terms of K stay; the limiter is that of the
    dissipation, so heat of this part only flows down the pair's temperature difference. k = h/J |c|^2 / (C.d). */
 TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g, const tlsph_real *C,
@@ -2344,7 +2496,8 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, c
     tlsph_real d[3], c_a[3], c_b[3];
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
     const tlsph_real Cd = tlsphi_dot(dim, C, d), D_theta = theta_b - theta_a;
-    const tlsph_real slope = (tlsphi_dot(dim, s->grad_theta + D * a, d) + tlsphi_dot(dim, s->grad_theta + D * b, d)) / 2;
+    const tlsph_real slope =
+        (tlsphi_dot(dim, s->grad_theta + D * a, d) + tlsphi_dot(dim, s->grad_theta + D * b, d)) / 2;
     const tlsph_real jump = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0);
     if (!(Cd > 0)) return;
     tlsphi_multiply(dim, s->A + dd * a, g, c_a);
@@ -2356,7 +2509,8 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, c
 }
 
 /* Audit: the pair's production over the size of its terms must not be negative beyond round-off. */
-static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsphi_gathered *before, const tlsphi_gathered *after, tlsph_real production) {
+static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsphi_gathered *before,
+                           const tlsphi_gathered *after, tlsph_real production) {
     const size_t D = (size_t)s->dim;
     double size = s->S ? fabs((double)(s->S[b] - s->S[a]) * (double)(after->J - before->J)) : 0;
     for (size_t i = 0; i < D; i++)
@@ -2364,8 +2518,8 @@ static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsp
     return size > 0 ? (double)production / size : 0;
 }
 
-TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int dim, const int with_J, const int thermal,
-                                     const int plain, tlsphi_gathered *sum) {
+TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int dim, const int with_J,
+                                     const int thermal, const int plain, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, dd = D * D;
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
@@ -2393,7 +2547,9 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
     }
 }
 
-/* Relaxation of J towards det F, -r c_p/D phi with r growing near incompressibility's other end (METHOD: J equation). */
+/* Relaxation of J towards det F, -r c_p/tau phi, r = min(1, r0 (c_s/c_p)^2 (1 + (ln(J/d)/0.05)^2)): slower the closer nu
+   is to 0.5, so that the pressure stays smooth, faster where the drift is large. Not entropy-stable pair by pair; for long
+   static loads. */
 static tlsph_real tlsphi_relaxation(const tlsph_solver *s, size_t a) {
     tlsphi_point pt;
     tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
@@ -2427,7 +2583,8 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
     s->rate_E[a] = s->thermal == TLSPH_ENERGY ? s->rate_E[a] + rate : rate;
 }
 
-TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const int dim, const int with_J, const int thermal, const int plain) {
+TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const int dim, const int with_J,
+                                     const int thermal, const int plain) {
     for (size_t a = block->begin; a < block->end; a++) {
         tlsphi_gathered sum;
         memset(&sum, 0, sizeof sum);
@@ -2436,19 +2593,26 @@ TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const
         tlsphi_flux_store(s, a, &sum, block->sums);
     }
 }
-#define TLSPHI_FLUX(dim, J, thermal) \
-    static void tlsphi_flux_##dim##J##thermal(tlsph_solver *s, tlsphi_block *b) { tlsphi_flux_range(s, b, dim, J, thermal, 1); }
-TLSPHI_FLUX(2, 0, 0) TLSPHI_FLUX(2, 0, 1) TLSPHI_FLUX(2, 0, 2) TLSPHI_FLUX(2, 1, 0) TLSPHI_FLUX(2, 1, 1) TLSPHI_FLUX(2, 1, 2)
-TLSPHI_FLUX(3, 0, 0) TLSPHI_FLUX(3, 0, 1) TLSPHI_FLUX(3, 0, 2) TLSPHI_FLUX(3, 1, 0) TLSPHI_FLUX(3, 1, 1) TLSPHI_FLUX(3, 1, 2)
+#define TLSPHI_FLUX(dim, J, thermal)                                                                                   \
+    static void tlsphi_flux_##dim##J##thermal(tlsph_solver *s, tlsphi_block *b) {                                      \
+        tlsphi_flux_range(s, b, dim, J, thermal, 1);                                                                   \
+    }
+TLSPHI_FLUX(2, 0, 0)
+TLSPHI_FLUX(2, 0, 1) TLSPHI_FLUX(2, 0, 2) TLSPHI_FLUX(2, 1, 0) TLSPHI_FLUX(2, 1, 1) TLSPHI_FLUX(2, 1, 2)
+    TLSPHI_FLUX(3, 0, 0) TLSPHI_FLUX(3, 0, 1) TLSPHI_FLUX(3, 0, 2) TLSPHI_FLUX(3, 1, 0) TLSPHI_FLUX(3, 1, 1)
+        TLSPHI_FLUX(3, 1, 2)
 
-/* All else: other dissipations, corrected kernels, audit. */
-static void tlsphi_flux_any(tlsph_solver *s, tlsphi_block *block) {
+    /* All else: other dissipations, corrected kernels, audit. */
+    static void tlsphi_flux_any(tlsph_solver *s, tlsphi_block *block) {
     if (s->dim == 3) tlsphi_flux_range(s, block, 3, s->has_J, s->thermal, 0);
     else tlsphi_flux_range(s, block, 2, s->has_J, s->thermal, 0);
 }
 static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
     for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
-    if (s->dissipation != TLSPH_LIMITED || s->M || s->audit) { tlsphi_flux_any(s, block); return; }
+    if (s->dissipation != TLSPH_LIMITED || s->M || s->audit) {
+        tlsphi_flux_any(s, block);
+        return;
+    }
     switch ((s->dim == 3 ? 6 : 0) + (s->has_J ? 3 : 0) + s->thermal) {
     case 0: tlsphi_flux_200(s, block); break;
     case 1: tlsphi_flux_201(s, block); break;
@@ -2476,8 +2640,15 @@ static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
 
 static int tlsphi_condition_components(tlsph_condition_kind kind) {
     switch (kind) {
-    case TLSPH_VELOCITY: case TLSPH_FORCE: case TLSPH_TRACTION: case TLSPH_BODY_FORCE: case TLSPH_ACCELERATION: return 3;
-    case TLSPH_PRESSURE: case TLSPH_TEMPERATURE: case TLSPH_HEAT_FLUX: case TLSPH_HEAT_SOURCE: return 1;
+    case TLSPH_VELOCITY:
+    case TLSPH_FORCE:
+    case TLSPH_TRACTION:
+    case TLSPH_BODY_FORCE:
+    case TLSPH_ACCELERATION: return 3;
+    case TLSPH_PRESSURE:
+    case TLSPH_TEMPERATURE:
+    case TLSPH_HEAT_FLUX:
+    case TLSPH_HEAT_SOURCE: return 1;
     default: return 0;
     }
 }
@@ -2485,9 +2656,12 @@ static int tlsphi_is_thermal(tlsph_condition_kind kind) {
     return kind == TLSPH_TEMPERATURE || kind == TLSPH_HEAT_FLUX || kind == TLSPH_HEAT_SOURCE;
 }
 
-/* One stage of the Runge-Kutta scheme: u = a u_old + b (u + dt L(u)); its rates and its corrections after the stage enter
-   the result of the step with these weights. */
-typedef struct tlsphi_stage { double a, b, start, end, rate_weight, after_weight; int last; } tlsphi_stage;
+/* One stage of the Runge-Kutta scheme: u = a u_old + b (u + dt L(u)); its rates and its corrections after the stage
+   enter the result of the step with these weights. */
+typedef struct tlsphi_stage {
+    double a, b, start, end, rate_weight, after_weight;
+    int last;
+} tlsphi_stage;
 
 /* Values of a load for this time: constant, or from the host's callback. */
 static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) {
@@ -2559,7 +2733,8 @@ static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tl
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
         const tlsph_real theta = s->theta[a];
-        const tlsph_real power = load->given.kind == TLSPH_HEAT_FLUX ? -load->values[i] * load->area[i] : load->values[i] * s->V[a];
+        const tlsph_real power =
+            load->given.kind == TLSPH_HEAT_FLUX ? -load->values[i] * load->area[i] : load->values[i] * s->V[a];
         s->rate_E[a] += power / s->V[a] / (s->thermal == TLSPH_ENTROPY ? theta : 1);
         s->account.external_heat += stage->rate_weight * dt * (double)power;
         s->account.external_entropy += stage->rate_weight * dt * (double)(power / theta);
@@ -2611,7 +2786,8 @@ static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage 
         tlsphi_driven_part(s->dim, &load->given, load->values + 3 * i, wanted);
         for (size_t k = 0; k < D; k++) p[k] += rho * wanted[k] - is[k];
         const double gain = (double)(rho * tlsphi_dot(s->dim, wanted, wanted) / 2) -
-                            stage->a * (double)(tlsphi_dot(s->dim, was, was) / (2 * rho)) - stage->b * (double)load->before[i];
+                            stage->a * (double)(tlsphi_dot(s->dim, was, was) / (2 * rho)) -
+                            stage->b * (double)load->before[i];
         if (s->thermal == TLSPH_ENERGY) s->now.E[a] += (tlsph_real)gain;
         s->account.external_work += stage->after_weight * gain * (double)s->V[a];
     }
@@ -2634,12 +2810,13 @@ static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, const tl
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
         const double rho = (double)tlsphi_material_of(s, a)->rho;
-        tlsph_real gap[3], *p = s->now.p + D * a;
+        tlsph_real gap[3] = {0, 0, 0}, *p = s->now.p + D * a;
         for (size_t k = 0; k < D; k++) gap[k] = s->now.x[D * a + k] - load->given.point[k];
         const tlsph_real along = tlsphi_dot(s->dim, p, N);
         if (tlsphi_dot(s->dim, gap, N) > 0 || along >= 0) continue;
         for (size_t k = 0; k < D; k++) p[k] -= along * N[k];
-        const double was = (double)tlsphi_dot(s->dim, s->old.p + D * a, N) / rho, is = (double)tlsphi_dot(s->dim, s->v + D * a, N);
+        const double was = (double)tlsphi_dot(s->dim, s->old.p + D * a, N) / rho,
+                     is = (double)tlsphi_dot(s->dim, s->v + D * a, N);
         const double rate = (double)tlsphi_dot(s->dim, s->rate_p + D * a, N);
         const double held = stage->a * rho * was * was / 2 + stage->b * (rho * is * is / 2 + dt * is * rate);
         s->account.contact_loss += stage->after_weight * held * (double)s->V[a];
@@ -2676,7 +2853,8 @@ static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt)
     for (size_t i = 0; i < s->loads; i++)
         if (s->load[i].given.kind == TLSPH_WALL) tlsphi_apply_wall(s, s->load + i, stage, dt);
     for (size_t i = 0; i < s->loads; i++)
-        if (s->load[i].given.kind == TLSPH_TEMPERATURE) tlsphi_hold_temperature(s, s->load + i, stage->after_weight, time);
+        if (s->load[i].given.kind == TLSPH_TEMPERATURE)
+            tlsphi_hold_temperature(s, s->load + i, stage->after_weight, time);
 }
 
 /* ==== [PROJECTION] =================================================================================================
@@ -2688,11 +2866,15 @@ static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt)
    Energy. Split v = rigid + w, where the rigid motion is the nearest one to v at the same positions. T^ does no work on
    the rigid part by construction, and T^ - T, being rigid, does none on w. So the power of the dissipative forces is
    sum w.D_p = -sum over pairs Dw.D_p, exactly what the dissipation, evaluated with w, gives to the particles as heat:
-   the energy is conserved and no entropy is destroyed. For the same reason the stresses heat by P : grad w; it differs from
-   P : dF/dt only because the last stage takes torques about x^{n+1}, by O(dt^2). Works with constraints, which take their part of T^ as reaction,
-   and body by body. */
+   the energy is conserved and no entropy is destroyed. For the same reason the stresses heat by P : grad w; it differs
+   from P : dF/dt only because the last stage takes torques about x^{n+1}, by O(dt^2). Works with constraints, which take
+   their part of T^ as reaction, and body by body. */
 
-typedef struct tlsphi_projection { tlsph_solver *s; tlsphi_stage stage; double dt; } tlsphi_projection;
+typedef struct tlsphi_projection {
+    tlsph_solver *s;
+    tlsphi_stage stage;
+    double dt;
+} tlsphi_projection;
 
 /* Positions of this stage are seen from the first particle of the body, for the sake of round-off. */
 static void tlsphi_projection_origin(const tlsphi_projection *p, const tlsphi_block *block, double origin[3]) {
@@ -2762,7 +2944,9 @@ static void tlsphi_rigid_motion(tlsphi_body *body, const double *m) {
         body->v_mean[i] = m[10 + i] / V;
     }
     const double xx = m[4] - V * c[0] * c[0], yy = m[5] - V * c[1] * c[1], zz = m[6] - V * c[2] * c[2];
-    I[0] = yy + zz; I[4] = xx + zz; I[8] = xx + yy;
+    I[0] = yy + zz;
+    I[4] = xx + zz;
+    I[8] = xx + yy;
     I[5] = I[7] = -(m[7] - V * c[1] * c[2]);
     I[2] = I[6] = -(m[8] - V * c[2] * c[0]);
     I[1] = I[3] = -(m[9] - V * c[0] * c[1]);
@@ -2791,7 +2975,8 @@ static void tlsphi_relative_task(void *arg, size_t i) {
     for (size_t a = block->begin; a < block->end; a++) {
         tlsphi_projection_arm(p, centre, a, X);
         tlsphi_cross3(body->spin, X, turn);
-        for (size_t k = 0; k < D; k++) s->w[D * a + k] = (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
+        for (size_t k = 0; k < D; k++)
+            s->w[D * a + k] = (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
     }
 }
 static void tlsphi_correct_task(void *arg, size_t i) {
@@ -2831,8 +3016,9 @@ static void tlsphi_project(tlsphi_projection *p) {
         const tlsphi_body *b = p->s->body + i;
         double spin_moment[3] = {0, 0, 0};
         for (int j = 0; j < 9; j++) spin_moment[j / 3] += b->inertia[j] * b->spin[j % 3];
-        p->s->account.projection_work += p->stage.rate_weight * p->dt *
-                                         (tlsphi_dot3(b->lambda, spin_moment) + b->volume * tlsphi_dot3(b->linear, b->v_mean));
+        p->s->account.projection_work +=
+            p->stage.rate_weight * p->dt *
+            (tlsphi_dot3(b->lambda, spin_moment) + b->volume * tlsphi_dot3(b->linear, b->v_mean));
     }
     tlsphi_run_tasks(p->s, tlsphi_correct_task, p);
 }
@@ -2884,11 +3070,14 @@ static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
     s->rate_E[a] += tlsphi_dot(s->dim, s->v + D * a, s->rate_p + D * a);
 }
 /* u = A old + B (u + dt rate) over the entries [begin, end). */
-static void tlsphi_combine(tlsph_real *u, const tlsph_real *old, const tlsph_real *rate, size_t begin, size_t end, tlsph_real A,
-                           tlsph_real B, tlsph_real dt) {
+static void tlsphi_combine(tlsph_real *u, const tlsph_real *old, const tlsph_real *rate, size_t begin, size_t end,
+                           tlsph_real A, tlsph_real B, tlsph_real dt) {
     for (size_t i = begin; i < end; i++) u[i] = A * old[i] + B * (u[i] + dt * rate[i]);
 }
-typedef struct tlsphi_update { tlsph_solver *s; tlsph_real A, B, dt; } tlsphi_update;
+typedef struct tlsphi_update {
+    tlsph_solver *s;
+    tlsph_real A, B, dt;
+} tlsphi_update;
 
 static void tlsphi_update_task(void *arg, size_t i) {
     const tlsphi_update *up = (const tlsphi_update *)arg;
@@ -2966,12 +3155,12 @@ TLSPHI_DEF tlsph_real tlsph_stable_time_step(const tlsph_solver *s) {
 /* Algorithm 1, from state n to n + 1. */
 static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     static const tlsphi_stage stages[2] = {{0, 1, 0, 1, 0.5, 0.5, 0}, {0.5, 0.5, 1, 1, 0.5, 1, 1}};
-    tlsphi_keep_state(s);                                /* (1) u_old, x_old                     */
+    tlsphi_keep_state(s); /* (1) u_old, x_old                     */
     for (int k = 0; k < 2; k++) {
-        tlsphi_right_hand_side(s, &stages[k], dt);       /* (4) rates, (5) projection            */
-        tlsphi_evolve(s, &stages[k], dt);                /* (6) u = a u_old + b (u + dt L)       */
-        tlsphi_impose(s, &stages[k], dt);                /* (7) constraints                      */
-        const tlsphi_block *bad = tlsphi_evaluate(s);    /* (8) stress, (9) temperature          */
+        tlsphi_right_hand_side(s, &stages[k], dt);    /* (4) rates, (5) projection            */
+        tlsphi_evolve(s, &stages[k], dt);             /* (6) u = a u_old + b (u + dt L)       */
+        tlsphi_impose(s, &stages[k], dt);             /* (7) constraints                      */
+        const tlsphi_block *bad = tlsphi_evaluate(s); /* (8) stress, (9) temperature          */
         if (bad) {
             const tlsph_result result = tlsphi_describe_failure(s, bad, "step");
             tlsphi_restore_state(s);
@@ -2984,14 +3173,14 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
 }
 
 TLSPHI_DEF tlsph_result tlsph_step(tlsph_solver *s, tlsph_real dt_limit) {
-    const double stable = (double)tlsph_stable_time_step(s);                    /* (2), (3) */
+    const double stable = (double)tlsph_stable_time_step(s); /* (2), (3) */
     const double dt = (double)dt_limit < stable ? (double)dt_limit : stable;
     if (tlsphi_nan(dt_limit) || !tlsphi_finite((tlsph_real)dt) || !(dt > 0) || !(dt < 1e290))
         return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "dt", TLSPH_NO_PARTICLE, (double)dt_limit, 0,
                            "more than 0; infinite only with a finite wave speed");
     if (s->first_dt > 0 && stable < 1e-9 * s->first_dt)
-        return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "stable dt", TLSPH_NO_PARTICLE, stable, 1e-9 * s->first_dt,
-                           "more than 1e-9 of the first step; wave speeds have run away");
+        return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "stable dt", TLSPH_NO_PARTICLE, stable,
+                           1e-9 * s->first_dt, "more than 1e-9 of the first step; wave speeds have run away");
     if (!(s->first_dt > 0)) s->first_dt = stable;
     const tlsph_result result = tlsphi_step_by(s, dt);
     if (!result) s->time += dt;
@@ -3106,7 +3295,8 @@ TLSPHI_DEF void tlsph_ledger_reset(tlsph_solver *s) {
 
 TLSPHI_DEF const char *tlsph_field_name(tlsph_field field) {
     switch (field) {
-#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return name;
+#define TLSPHI_FIELD(id, name, unit, components, writable)                                                             \
+    case id: return name;
         TLSPH_FIELDS(TLSPHI_FIELD)
 #undef TLSPHI_FIELD
     default: return "";
@@ -3114,7 +3304,8 @@ TLSPHI_DEF const char *tlsph_field_name(tlsph_field field) {
 }
 TLSPHI_DEF const char *tlsph_field_unit(tlsph_field field) {
     switch (field) {
-#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return unit;
+#define TLSPHI_FIELD(id, name, unit, components, writable)                                                             \
+    case id: return unit;
         TLSPH_FIELDS(TLSPHI_FIELD)
 #undef TLSPHI_FIELD
     default: return "";
@@ -3122,7 +3313,8 @@ TLSPHI_DEF const char *tlsph_field_unit(tlsph_field field) {
 }
 TLSPHI_DEF int tlsph_field_components(tlsph_field field) {
     switch (field) {
-#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return components;
+#define TLSPHI_FIELD(id, name, unit, components, writable)                                                             \
+    case id: return components;
         TLSPH_FIELDS(TLSPHI_FIELD)
 #undef TLSPHI_FIELD
     default: return 0;
@@ -3130,7 +3322,8 @@ TLSPHI_DEF int tlsph_field_components(tlsph_field field) {
 }
 static int tlsphi_field_writable(tlsph_field field) {
     switch (field) {
-#define TLSPHI_FIELD(id, name, unit, components, writable) case id: return writable;
+#define TLSPHI_FIELD(id, name, unit, components, writable)                                                             \
+    case id: return writable;
         TLSPH_FIELDS(TLSPHI_FIELD)
 #undef TLSPHI_FIELD
     default: return 0;
@@ -3196,9 +3389,12 @@ static void tlsphi_read_derived(const tlsph_solver *s, size_t a, tlsph_field fie
     case TLSPH_FIELD_VON_MISES: *out = tlsphi_von_mises(&pt, volume); break;
     case TLSPH_FIELD_SIGMA_F:
         for (int i = 0; i < 9; i++)
-            out[i] = m->kind == TLSPH_USER || m->kind == TLSPH_LINEAR ? pt.r.e_F[i] - pt.theta * pt.r.eta_F[i] : weight * pt.dev.a * pt.F[i];
+            out[i] = m->kind == TLSPH_USER || m->kind == TLSPH_LINEAR ? pt.r.e_F[i] - pt.theta * pt.r.eta_F[i]
+                                                                      : weight * pt.dev.a * pt.F[i];
         break;
-    case TLSPH_FIELD_SIGMA_H: for (int i = 0; i < 9; i++) out[i] = weight * pt.dev.b * pt.H[i]; break;
+    case TLSPH_FIELD_SIGMA_H:
+        for (int i = 0; i < 9; i++) out[i] = weight * pt.dev.b * pt.H[i];
+        break;
     case TLSPH_FIELD_SIGMA_J: *out = pt.Sigma_J; break;
     case TLSPH_FIELD_INTERNAL_ENERGY: *out = internal; break;
     case TLSPH_FIELD_HELMHOLTZ_ENERGY: *out = internal - pt.theta * entropy; break;
@@ -3209,7 +3405,8 @@ static void tlsphi_read_derived(const tlsph_solver *s, size_t a, tlsph_field fie
 }
 static int tlsphi_field_exists(const tlsph_solver *s, tlsph_field field) {
     if ((unsigned)field >= (unsigned)TLSPH_FIELD_COUNT) return 0;
-    return s->thermal || (field != TLSPH_FIELD_TEMPERATURE && field != TLSPH_FIELD_ENERGY && field != TLSPH_FIELD_ENTROPY);
+    return s->thermal ||
+           (field != TLSPH_FIELD_TEMPERATURE && field != TLSPH_FIELD_ENERGY && field != TLSPH_FIELD_ENTROPY);
 }
 TLSPHI_DEF tlsph_result tlsph_read(const tlsph_solver *s, tlsph_field field, tlsph_real *out) {
     if (!tlsphi_field_exists(s, field)) return TLSPH_ERROR_FIELD;
@@ -3243,7 +3440,9 @@ static void tlsphi_write_particle(tlsph_solver *s, size_t a, tlsph_field field, 
     const tlsph_real rho = tlsphi_material_of(s, a)->rho;
     switch (field) {
     case TLSPH_FIELD_POSITION: memcpy(s->now.x + D * a, in, D * sizeof *in); break;
-    case TLSPH_FIELD_VELOCITY: for (size_t i = 0; i < D; i++) s->now.p[D * a + i] = rho * in[i]; break;
+    case TLSPH_FIELD_VELOCITY:
+        for (size_t i = 0; i < D; i++) s->now.p[D * a + i] = rho * in[i];
+        break;
     case TLSPH_FIELD_F: tlsphi_write_gradient(s, a, in); break;
     case TLSPH_FIELD_J: s->now.J[a] = *in; break;
     default: break;
@@ -3256,16 +3455,18 @@ static tlsph_result tlsphi_check_input(tlsph_solver *s, tlsph_field field, const
         for (size_t k = 0; k < components; k++) {
             const tlsph_real value = in[components * a + k];
             if (!tlsphi_finite(value))
-                return tlsphi_fail(&s->error, TLSPH_ERROR_NOT_FINITE, "write", tlsph_field_name(field), a, (double)value, 0, "finite");
+                return tlsphi_fail(&s->error, TLSPH_ERROR_NOT_FINITE, "write", tlsph_field_name(field), a,
+                                   (double)value, 0, "finite");
             if (field == TLSPH_FIELD_TEMPERATURE && !(value > 0))
-                return tlsphi_fail(&s->error, TLSPH_ERROR_TEMPERATURE, "write", "temperature", a, (double)value, 0, "more than 0");
+                return tlsphi_fail(&s->error, TLSPH_ERROR_TEMPERATURE, "write", "temperature", a, (double)value, 0,
+                                   "more than 0");
         }
     return TLSPH_OK;
 }
 TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tlsph_real *in) {
     if (!tlsphi_field_exists(s, field) || !tlsphi_field_writable(field) || (field == TLSPH_FIELD_J && !s->has_J))
-        return tlsphi_fail(&s->error, TLSPH_ERROR_FIELD, "write", tlsph_field_name(field), TLSPH_NO_PARTICLE, (double)field, 0,
-                           "a writable field that the scene evolves");
+        return tlsphi_fail(&s->error, TLSPH_ERROR_FIELD, "write", tlsph_field_name(field), TLSPH_NO_PARTICLE,
+                           (double)field, 0, "a writable field that the scene evolves");
     if (!in) return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "write", "in", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
     tlsph_result result = tlsphi_check_input(s, field, in);
     if (result) return result;
@@ -3274,7 +3475,8 @@ TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tl
     tlsphi_keep_state(s);
     for (size_t a = 0; a < s->n; a++) tlsphi_write_particle(s, a, field, in + components * s->host[a]);
     if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s);
-    for (size_t a = 0; s->thermal && a < s->n; a++) tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : s->theta[a]);
+    for (size_t a = 0; s->thermal && a < s->n; a++)
+        tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : s->theta[a]);
     const tlsphi_block *bad = tlsphi_evaluate(s);
     if (bad) {
         result = tlsphi_describe_failure(s, bad, "write");
@@ -3391,13 +3593,16 @@ static tlsph_result tlsphi_check_checkpoint(tlsph_solver *s, const unsigned char
     const char *const field = "checkpoint";
     const size_t wanted = tlsph_save_size(s);
     if (size < wanted)
-        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "bytes", TLSPH_NO_PARTICLE, (double)size, (double)wanted, "as saved");
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "bytes", TLSPH_NO_PARTICLE, (double)size,
+                           (double)wanted, "as saved");
     const unsigned char *at = bytes + wanted - 8;
     if (memcmp(bytes, "TLSPHCK1", 8) || tlsphi_get(&at, 8) != tlsphi_hash(0xcbf29ce484222325u, bytes, wanted - 8))
-        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", field, TLSPH_NO_PARTICLE, 0, 0, "undamaged data of tlsph_save");
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", field, TLSPH_NO_PARTICLE, 0, 0,
+                           "undamaged data of tlsph_save");
     at = bytes + 8;
     if (tlsphi_get(&at, 8) != sizeof(tlsph_real) || tlsphi_get(&at, 8) != s->fingerprint)
-        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "fingerprint", TLSPH_NO_PARTICLE, 0, 0, "a checkpoint of the same description");
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "fingerprint", TLSPH_NO_PARTICLE, 0, 0,
+                           "a checkpoint of the same description");
     return TLSPH_OK;
 }
 TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_t size) {
@@ -3405,7 +3610,8 @@ TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_
     tlsph_real *array[6];
     size_t components[6];
     double accounts[TLSPHI_ACCOUNTS];
-    if (!buffer) return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "restore", "buffer", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
+    if (!buffer)
+        return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "restore", "buffer", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
     const tlsph_result result = tlsphi_check_checkpoint(s, at, size);
     if (result) return result;
     at += 24;
@@ -3425,13 +3631,19 @@ TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_
 
 /* ==== [VALIDATION] ================================================================================================= */
 
-static tlsph_result tlsphi_check_range(tlsphi_plan *plan, const char *field, double value, double low, double high, const char *allowed) {
-    return value >= low && value <= high ? TLSPH_OK
-                                         : tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, field, TLSPH_NO_PARTICLE, value, low, allowed);
+static tlsph_result tlsphi_check_range(tlsphi_plan *plan, const char *field, double value, double low, double high,
+                                       const char *allowed) {
+    return tlsphi_finite((tlsph_real)value) && value >= low && value <= high
+               ? TLSPH_OK
+               : tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, field, TLSPH_NO_PARTICLE, value, low, allowed);
 }
 static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
     const tlsph_desc *d = plan->desc;
-    const struct { const char *name; double value, low, high; const char *allowed; } range[] = {
+    const struct {
+        const char *name;
+        double value, low, high;
+        const char *allowed;
+    } range[] = {
         {"cookie", (double)d->cookie, TLSPHI_COOKIE, TLSPHI_COOKIE, "what tlsph_desc_default sets"},
         {"dimension", (double)d->dimension, 2, 3, "2 or 3"},
         {"unknowns", (double)d->unknowns, TLSPH_PF, TLSPH_PFH, "a tlsph_unknowns"},
@@ -3454,17 +3666,22 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"particles.count", (double)d->particles.count, 2, 4294967294.0, "2 to 2^32 - 2"},
     };
     if (d->cookie == TLSPHI_COOKIE && !tlsphi_finite(d->particles.spacing))
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "particles.spacing", TLSPH_NO_PARTICLE, (double)d->particles.spacing, 0, "finite");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "particles.spacing", TLSPH_NO_PARTICLE,
+                                (double)d->particles.spacing, 0, "finite");
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++) {
-        const tlsph_result r = tlsphi_check_range(plan, range[i].name, range[i].value, range[i].low, range[i].high, range[i].allowed);
+        const tlsph_result r =
+            tlsphi_check_range(plan, range[i].name, range[i].value, range[i].low, range[i].high, range[i].allowed);
         if (r) return r;
     }
-    const int pointers = d->materials && d->particles.positions && (d->particles.volumes || d->operator_kind == TLSPH_CELLS) &&
+    const int pointers = d->materials && d->particles.positions &&
+                         (d->particles.volumes || d->operator_kind == TLSPH_CELLS) &&
                          (!d->condition_count || d->conditions) &&
                          (d->operator_kind != TLSPH_CELLS || (d->particles.cells && d->particles.cell_count)) &&
-                         (d->operator_kind != TLSPH_GIVEN || (d->particles.first && d->particles.neighbours && d->particles.pair_vectors));
+                         (d->operator_kind != TLSPH_GIVEN ||
+                          (d->particles.first && d->particles.neighbours && d->particles.pair_vectors));
     if (!d->allocator.allocate != !d->allocator.release)
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "allocator", TLSPH_NO_PARTICLE, 0, 0, "both functions or neither");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "allocator", TLSPH_NO_PARTICLE, 0, 0,
+                                "both functions or neither");
     if (!pointers)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "a pointer", TLSPH_NO_PARTICLE, 0, 0,
                                 "not NULL: materials, positions, volumes, conditions and what the operator needs");
@@ -3476,61 +3693,76 @@ static tlsph_result tlsphi_check_particles(tlsphi_plan *plan) {
     for (size_t a = 0; a < p->count; a++) {
         for (int i = 0; i < d->dimension; i++)
             if (!tlsphi_finite(p->positions[3 * a + (size_t)i]))
-                return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "position", a, (double)p->positions[3 * a + (size_t)i], 0, "finite");
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "position", a,
+                                        (double)p->positions[3 * a + (size_t)i], 0, "finite");
         for (int i = 0; i < 2; i++) {
             const tlsph_real *const array = i ? p->weights : p->volumes;
             if (!array || (array[a] > 0 && tlsphi_finite(array[a]))) continue;
-            return tlsphi_plan_fail(plan, tlsphi_finite(array[a]) ? TLSPH_ERROR_VOLUME : TLSPH_ERROR_NOT_FINITE, i ? "weight" : "volume", a,
-                                    (double)array[a], 0, "more than 0, finite");
+            return tlsphi_plan_fail(plan, tlsphi_finite(array[a]) ? TLSPH_ERROR_VOLUME : TLSPH_ERROR_NOT_FINITE,
+                                    i ? "weight" : "volume", a, (double)array[a], 0, "more than 0, finite");
         }
         if (p->materials && p->materials[a] >= d->material_count)
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, "material index", a, p->materials[a], (double)d->material_count,
-                                    "less than material_count");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, "material index", a, p->materials[a],
+                                    (double)d->material_count, "less than material_count");
     }
     return TLSPH_OK;
 }
 static tlsph_result tlsphi_check_materials(tlsphi_plan *plan) {
     for (size_t i = 0; i < plan->desc->material_count; i++) {
         double value;
-        const char *allowed, *fault = tlsphi_material_fault(plan->desc->materials + i, plan->desc->thermal != TLSPH_ISOTHERMAL, &value, &allowed);
+        const char *allowed, *fault = tlsphi_material_fault(plan->desc->materials + i,
+                                                            plan->desc->thermal != TLSPH_ISOTHERMAL, &value, &allowed);
         if (fault) return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, fault, TLSPH_NO_PARTICLE, value, 0, allowed);
     }
     return TLSPH_OK;
 }
 /* The particles that a condition concerns: a list, or all. */
-static size_t tlsphi_set_size(const tlsphi_plan *plan, const tlsph_condition *c) { return c->particles ? c->count : plan->n; }
-static uint32_t tlsphi_set_host(const tlsph_condition *c, size_t i) { return c->particles ? c->particles[i] : (uint32_t)i; }
+static size_t tlsphi_set_size(const tlsphi_plan *plan, const tlsph_condition *c) {
+    return c->particles ? c->count : plan->n;
+}
+static uint32_t tlsphi_set_host(const tlsph_condition *c, size_t i) {
+    return c->particles ? c->particles[i] : (uint32_t)i;
+}
 
 static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condition *c) {
     const size_t n = plan->n;
     const int plane = c->kind == TLSPH_ROLLER || c->kind == TLSPH_TANGENT || c->kind == TLSPH_WALL;
     const tlsph_real NN = tlsphi_dot(plan->dim, c->normal, c->normal);
     if (c->cookie != TLSPHI_COOKIE || (unsigned)c->kind > (unsigned)TLSPH_WALL)
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "cookie or kind", TLSPH_NO_PARTICLE, (double)c->kind, 0, "what tlsph_condition_default sets");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "cookie or kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
+                                "what tlsph_condition_default sets");
     if (!c->particles && c->count)
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particles", TLSPH_NO_PARTICLE, (double)c->count, 0, "not NULL, or count 0 for all");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particles", TLSPH_NO_PARTICLE, (double)c->count, 0,
+                                "not NULL, or count 0 for all");
     if (!tlsphi_all_finite(c->normal, 3) || !tlsphi_all_finite(c->value, 3) || !tlsphi_all_finite(c->point, 3))
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "value, normal or point", TLSPH_NO_PARTICLE, 0, 0, "finite");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "value, normal or point", TLSPH_NO_PARTICLE, 0, 0,
+                                "finite");
     if (plane && !(NN > 0))
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "normal", TLSPH_NO_PARTICLE, (double)NN, 0, "not zero for this kind");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "normal", TLSPH_NO_PARTICLE, (double)NN, 0,
+                                "not zero for this kind");
     if (tlsphi_is_thermal(c->kind) && !plan->desc->thermal)
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0, "no heat in an isothermal scene");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
+                                "no heat in an isothermal scene");
     if (c->kind == TLSPH_TEMPERATURE && !c->values && !(c->value[0] > 0))
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "temperature", TLSPH_NO_PARTICLE, (double)c->value[0], 0, "more than 0");
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "temperature", TLSPH_NO_PARTICLE, (double)c->value[0], 0,
+                                "more than 0");
     for (size_t i = 0; i < c->count; i++)
         if (c->particles[i] >= n)
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particle number", c->particles[i], (double)c->particles[i], (double)n,
-                                    "less than the number of particles");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particle number", c->particles[i],
+                                    (double)c->particles[i], (double)n, "less than the number of particles");
     const size_t per = c->kind == TLSPH_PRESSURE ? 3 : 1;
     for (size_t i = 0; c->areas && i < per * tlsphi_set_size(plan, c); i++)
         if (!tlsphi_finite(c->areas[i]))
-            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "area", tlsphi_set_host(c, i / per), (double)c->areas[i], 0, "finite");
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "area", tlsphi_set_host(c, i / per),
+                                    (double)c->areas[i], 0, "finite");
     return TLSPH_OK;
 }
 
 /* ==== [CREATION] =================================================================================================== */
 
-static int tlsphi_is_constraint(tlsph_condition_kind kind) { return kind == TLSPH_CLAMPED || kind == TLSPH_ROLLER || kind == TLSPH_TANGENT; }
+static int tlsphi_is_constraint(tlsph_condition_kind kind) {
+    return kind == TLSPH_CLAMPED || kind == TLSPH_ROLLER || kind == TLSPH_TANGENT;
+}
 
 /* Adds what is new in direction e to the orthonormal fixed directions of a particle (Gram-Schmidt). */
 static void tlsphi_fix_direction(tlsphi_plan *plan, uint32_t host, const double e[3]) {
@@ -3588,7 +3820,8 @@ static tlsph_result tlsphi_plan_conditions(tlsphi_plan *plan) {
     plan->fixed_direction = TLSPHI_SCRATCH(plan, double, (size_t)(plan->dim * plan->dim) * plan->n);
     if (!plan->fixed || !plan->fixed_direction) return tlsphi_no_memory(plan, 73.0 * (double)plan->n);
     for (size_t k = 0; k < d->condition_count; k++)
-        for (size_t i = 0; tlsphi_is_constraint(d->conditions[k].kind) && i < tlsphi_set_size(plan, d->conditions + k); i++)
+        for (size_t i = 0; tlsphi_is_constraint(d->conditions[k].kind) && i < tlsphi_set_size(plan, d->conditions + k);
+             i++)
             tlsphi_fix_particle(plan, d->conditions + k, tlsphi_set_host(d->conditions + k, i));
     return TLSPH_OK;
 }
@@ -3623,17 +3856,19 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     plan->dim = desc->dimension;
     plan->n = desc->particles.count;
     plan->weights = desc->particles.weights ? desc->particles.weights : desc->particles.volumes;
-    if ((r = tlsphi_check_particles(plan)) || (r = tlsphi_check_materials(plan)) || (r = tlsphi_plan_conditions(plan))) return r;
+    if ((r = tlsphi_check_particles(plan)) || (r = tlsphi_check_materials(plan)) || (r = tlsphi_plan_conditions(plan)))
+        return r;
     if (desc->operator_kind == TLSPH_CELLS && (r = tlsphi_cells_build(plan))) return r;
     if (desc->operator_kind == TLSPH_GIVEN && (r = tlsphi_given_check(plan))) return r;
     tlsphi_smoothing_length(plan);
     if ((r = tlsphi_grid_build(plan))) return r;
     const size_t most = tlsphi_count_pairs(plan), D = (size_t)plan->dim;
     uint32_t *list = TLSPHI_SCRATCH(plan, uint32_t, most);
-    double *g = TLSPHI_SCRATCH(plan, double, D * most);
+    double *g = TLSPHI_SCRATCH(plan, double, D *most);
     uint32_t *parent = TLSPHI_SCRATCH(plan, uint32_t, plan->n);
     if (!list || !g || !parent) return tlsphi_no_memory(plan, 32.0 * (double)most);
-    if (desc->operator_kind == TLSPH_CORRECTED_KERNEL && !(plan->correction = TLSPHI_SCRATCH(plan, double, D * D * plan->n)))
+    if (desc->operator_kind == TLSPH_CORRECTED_KERNEL &&
+        !(plan->correction = TLSPHI_SCRATCH(plan, double, D *D * plan->n)))
         return tlsphi_no_memory(plan, 72.0 * (double)plan->n);
     for (size_t a = 0; a < plan->n; a++) parent[a] = (uint32_t)a;
     if ((r = tlsphi_survey(plan, parent, list, g))) return r;
@@ -3693,11 +3928,20 @@ static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
         tlsphi_state *u = i ? &s->old : &s->now;
         tlsph_real *at = i ? s->old_memory : s->now_memory;
         memset(u, 0, sizeof *u);
-        u->x = at; at += D * n;
-        u->p = at; at += D * n;
-        u->F = at; at += D * D * n;
-        if (s->has_H) { u->H = at; at += D * D * n; }
-        if (s->has_J) { u->J = at; at += n; }
+        u->x = at;
+        at += D * n;
+        u->p = at;
+        at += D * n;
+        u->F = at;
+        at += D * D * n;
+        if (s->has_H) {
+            u->H = at;
+            at += D * D * n;
+        }
+        if (s->has_J) {
+            u->J = at;
+            at += n;
+        }
         if (s->thermal) u->E = at;
     }
 }
@@ -3741,7 +3985,8 @@ static void tlsphi_layout_loads(tlsph_solver *s, tlsphi_arena *arena, const tlsp
         load.given.count = count;
         load.inner = TLSPHI_TAKE(arena, uint32_t, count);
         load.host = TLSPHI_TAKE(arena, uint32_t, count);
-        load.area = TLSPHI_TAKE(arena, tlsph_real, has_area ? count * (c->kind == TLSPH_PRESSURE ? (size_t)s->dim : 1) : 0);
+        load.area =
+            TLSPHI_TAKE(arena, tlsph_real, has_area ? count * (c->kind == TLSPH_PRESSURE ? (size_t)s->dim : 1) : 0);
         load.values = TLSPHI_TAKE(arena, tlsph_real, count * components);
         load.X = TLSPHI_TAKE(arena, tlsph_real, c->values ? 3 * count : 0);
         load.x = TLSPHI_TAKE(arena, tlsph_real, c->values ? 3 * count : 0);
@@ -3804,7 +4049,8 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
         s->host[a] = h;
         s->inner[h] = (uint32_t)a;
         s->V[a] = (tlsph_real)tlsphi_plan_volume(plan, h);
-        if (s->material_of) s->material_of[a] = plan->desc->particles.materials ? plan->desc->particles.materials[h] : 0;
+        if (s->material_of)
+            s->material_of[a] = plan->desc->particles.materials ? plan->desc->particles.materials[h] : 0;
         for (size_t i = 0; i < D; i++) {
             s->X[D * a + i] = s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
             s->now.F[D * D * a + (D + 1) * i] = 1;
@@ -3813,7 +4059,8 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
         if (s->has_J) s->now.J[a] = 1;
     }
     for (size_t a = 0; s->M && a < s->n; a++)
-        for (size_t i = 0; i < D * D; i++) s->M[D * D * a + i] = (tlsph_real)plan->correction[D * D * plan->host[a] + i];
+        for (size_t i = 0; i < D * D; i++)
+            s->M[D * D * a + i] = (tlsph_real)plan->correction[D * D * plan->host[a] + i];
 }
 
 /* M_a g, or g where there is no correction, in double; a is a host number. */
@@ -3847,6 +4094,7 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         const size_t start = s->first[a], count = tlsphi_neighbours_of(plan, h, list, g);
         double B[3] = {0, 0, 0}, sum = 0;
         s->first[a + 1] = start + count;
+        TLSPH_ASSERT(start + count <= s->pairs);
         for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
         tlsphi_sort_pairs(s->dim, list, g, count);
         for (size_t i = 0; i < count; i++) {
@@ -3863,7 +4111,8 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
             sum += sqrt(square);
         }
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
-        s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum / (s->sharp ? TLSPHI_SHARP_FREQUENCY : 1));
+        s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum /
+                                 (s->sharp ? TLSPHI_SHARP_FREQUENCY : 1));
     }
 }
 static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
@@ -3881,7 +4130,8 @@ static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
 static void tlsphi_fill_mirrors(tlsph_solver *s, const tlsphi_plan *plan) {
     if (!s->mirrors) return;
     for (size_t a = 0; a < s->n; a++) s->mirror_of[a] = 0;
-    for (int pass = 0; pass < 2; pass++) { /* count, then place; mirror_of counts up to each particle's end and is walked back */
+    for (int pass = 0; pass < 2;
+         pass++) { /* count, then place; mirror_of counts up to each particle's end and is walked back */
         for (size_t k = 0; k < plan->desc->condition_count; k++) {
             const tlsph_condition *c = plan->desc->conditions + k;
             if (c->kind != TLSPH_ROLLER && c->kind != TLSPH_TANGENT) continue;
@@ -3889,7 +4139,10 @@ static void tlsphi_fill_mirrors(tlsph_solver *s, const tlsphi_plan *plan) {
             tlsphi_unit_normal(c, s->dim, N);
             for (size_t i = 0; i < tlsphi_set_size(plan, c); i++) {
                 const uint32_t a = plan->inner[tlsphi_set_host(c, i)];
-                if (!pass) { s->mirror_of[a]++; continue; }
+                if (!pass) {
+                    s->mirror_of[a]++;
+                    continue;
+                }
                 tlsphi_mirror *m = s->mirror + --s->mirror_of[a];
                 m->particle = a;
                 m->tangent = c->kind == TLSPH_TANGENT;
@@ -3910,7 +4163,9 @@ static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, con
     const tlsph_real along = NN > 0 ? tlsphi_dot(s->dim, B, c->normal) / tlsphi_sqrt(NN) : 0;
     if (c->kind == TLSPH_PRESSURE) {
         for (size_t k = 0; k < D; k++)
-            load->area[D * i + k] = c->areas ? c->areas[3 * i + k] : NN > 0 ? along * c->normal[k] / tlsphi_sqrt(NN) : B[k];
+            load->area[D * i + k] = c->areas ? c->areas[3 * i + k]
+                                    : NN > 0 ? along * c->normal[k] / tlsphi_sqrt(NN)
+                                             : B[k];
         return;
     }
     load->area[i] = c->areas ? c->areas[i] : NN > 0 ? along : tlsphi_sqrt(tlsphi_dot(s->dim, B, B));
@@ -3947,7 +4202,8 @@ static uint64_t tlsphi_hash_reals(uint64_t h, const tlsph_real *x, size_t n) {
 }
 /* What a checkpoint must agree with: the layout of the state, the reference geometry and the materials. */
 static uint64_t tlsphi_fingerprint(const tlsph_solver *s) {
-    const unsigned char options[6] = {(unsigned char)s->dim, (unsigned char)s->thermal, (unsigned char)s->has_H, (unsigned char)s->has_J,
+    const unsigned char options[6] = {(unsigned char)s->dim,      (unsigned char)s->thermal,
+                                      (unsigned char)s->has_H,    (unsigned char)s->has_J,
                                       (unsigned char)s->coupling, (unsigned char)s->material_count};
     uint64_t h = tlsphi_hash(0xcbf29ce484222325u, options, sizeof options);
     for (size_t i = 0; i < s->n; i++) {
@@ -3972,6 +4228,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     if (!list || !g) return tlsphi_no_memory(plan, 32.0 * (double)plan->most);
     for (size_t i = 0; i < s->material_count; i++) s->materials[i] = tlsphi_calibrate(plan->desc->materials + i);
     tlsphi_fill_blocks(s, plan);
+    TLSPH_ASSERT(s->block[s->blocks - 1].end == s->n);
     tlsphi_fill_particles(s, plan);
     tlsphi_fill_pairs(s, plan, list, g);
     tlsphi_fill_fixes(s, plan);
@@ -4003,7 +4260,8 @@ static tlsph_result tlsphi_measure_plan(tlsph_solver *s, const tlsphi_plan *plan
     tlsphi_copy_options(s, plan);
     tlsphi_layout(s, &arena, plan);
     if (!arena.overflow) return TLSPH_OK;
-    return tlsphi_fail(plan->error, TLSPH_ERROR_SIZE, "create", "bytes", TLSPH_NO_PARTICLE, (double)s->n, 0, "what an address can reach");
+    return tlsphi_fail(plan->error, TLSPH_ERROR_SIZE, "create", "bytes", TLSPH_NO_PARTICLE, (double)s->n, 0,
+                       "what an address can reach");
 }
 TLSPHI_DEF tlsph_result tlsph_measure(const tlsph_desc *desc, tlsph_size *size, tlsph_error *error) {
     tlsphi_plan plan;
@@ -4021,9 +4279,10 @@ static tlsph_result tlsphi_take_block(tlsphi_plan *plan, const tlsph_size *size,
     memset(arena, 0, sizeof *arena);
     arena->size = size->bytes;
     if (d->memory && d->memory_size < size->bytes)
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "memory_size", TLSPH_NO_PARTICLE, (double)d->memory_size, (double)size->bytes,
-                                "tlsph_measure's bytes or more");
-    arena->memory = (unsigned char *)(d->memory ? d->memory : plan->allocator.allocate(plan->allocator.user, size->bytes));
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "memory_size", TLSPH_NO_PARTICLE, (double)d->memory_size,
+                                (double)size->bytes, "tlsph_measure's bytes or more");
+    arena->memory =
+        (unsigned char *)(d->memory ? d->memory : plan->allocator.allocate(plan->allocator.user, size->bytes));
     return arena->memory ? TLSPH_OK : tlsphi_no_memory(plan, (double)size->bytes);
 }
 static tlsph_result tlsphi_create_planned(tlsphi_plan *plan, tlsph_solver **out) {
@@ -4040,6 +4299,7 @@ static tlsph_result tlsphi_create_planned(tlsphi_plan *plan, tlsph_solver **out)
     tlsphi_copy_options(&draft, plan);
     *s = draft;
     tlsphi_layout(s, &arena, plan);
+    TLSPH_ASSERT(!arena.overflow && arena.used <= size);
     s->allocator = plan->allocator;
     s->memory = block;
     s->memory_size = size;
@@ -4103,20 +4363,21 @@ TLSPHI_DEF tlsph_condition tlsph_condition_default(tlsph_condition_kind kind) {
 
 /* ==== [FILL] =======================================================================================================
    A lattice of cells over the shape's box. A cell belongs to the body if its centre does. On-face particles sit at the
-   corners of cells with an eighth (2-D: a quarter) of each cell around them; cell-centred ones in the middle. The lines of
-   the lattice are spaced per segment, so that the notch of an L lies on a line. */
+   corners of cells with an eighth (2-D: a quarter) of each cell around them; cell-centred ones in the middle. The lines
+   of the lattice are spaced per segment, so that the notch of an L lies on a line. */
 
 #define TLSPHI_LINES 4096 /* at most, per axis */
 
 typedef struct tlsphi_lattice {
     const tlsph_fill *fill;
     tlsph_allocator allocator;
-    size_t cells[3], lines[3];      /* per axis */
-    double *line[3];                /* coordinates */
-    unsigned char *inside;          /* per cell */
-    uint32_t *number;               /* per corner or cell: particle, or TLSPHI_NONE */
+    size_t cells[3], lines[3]; /* per axis */
+    double *line[3];           /* coordinates */
+    unsigned char *inside;     /* per cell */
+    uint32_t *number;          /* per corner or cell: particle, or TLSPHI_NONE */
     size_t particles, body_cells;
-    void *memory; size_t memory_size;
+    void *memory;
+    size_t memory_size;
 } tlsphi_lattice;
 
 static int tlsphi_inside(const tlsph_fill *f, const double X[3]) {
@@ -4124,9 +4385,12 @@ static int tlsphi_inside(const tlsph_fill *f, const double X[3]) {
     tlsph_real at[3];
     for (int i = 0; i < 3; i++) at[i] = (tlsph_real)X[i];
     switch (f->shape) {
-    case TLSPH_L_SHAPE: return !(X[0] > (double)f->origin[0] + (double)f->notch[0] && X[1] > (double)f->origin[1] + (double)f->notch[1]);
+    case TLSPH_L_SHAPE:
+        return !(X[0] > (double)f->origin[0] + (double)f->notch[0] &&
+                 X[1] > (double)f->origin[1] + (double)f->notch[1]);
     case TLSPH_PREDICATE: return f->inside(f->inside_user, at);
-    case TLSPH_CYLINDER: case TLSPH_SPHERE:
+    case TLSPH_CYLINDER:
+    case TLSPH_SPHERE:
         for (int i = 0; i < f->dimension; i++) {
             const double half = (double)f->size[i] / 2, d = X[i] - (double)f->origin[i] - half;
             if (f->shape == TLSPH_CYLINDER && f->dimension == 3 && i == f->axis) continue;
@@ -4153,8 +4417,12 @@ static size_t tlsphi_axis_lines(const tlsph_fill *f, int axis, double *line) {
     return first + tlsphi_segment(line ? line + first : NULL, low + notch, length - notch, spacing);
 }
 
-static size_t tlsphi_cell_index(const tlsphi_lattice *l, const size_t c[3]) { return (c[2] * l->cells[1] + c[1]) * l->cells[0] + c[0]; }
-static size_t tlsphi_line_index(const tlsphi_lattice *l, const size_t c[3]) { return (c[2] * l->lines[1] + c[1]) * l->lines[0] + c[0]; }
+static size_t tlsphi_cell_index(const tlsphi_lattice *l, const size_t c[3]) {
+    return (c[2] * l->cells[1] + c[1]) * l->cells[0] + c[0];
+}
+static size_t tlsphi_line_index(const tlsphi_lattice *l, const size_t c[3]) {
+    return (c[2] * l->lines[1] + c[1]) * l->lines[0] + c[0];
+}
 static double tlsphi_lattice_cell(const tlsphi_lattice *l, const size_t c[3], double centre[3]) {
     double volume = 1;
     centre[2] = 0;
@@ -4191,7 +4459,8 @@ static size_t tlsphi_corner(const tlsphi_lattice *l, const size_t c[3], int k) {
 static void tlsphi_mark_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
     (void)arg;
     if (l->fill->placement == TLSPH_CELL_CENTRED) l->number[tlsphi_cell_index(l, c)] = 0;
-    else for (int k = 0; k < 1 << l->fill->dimension; k++) l->number[tlsphi_corner(l, c, k)] = 0;
+    else
+        for (int k = 0; k < 1 << l->fill->dimension; k++) l->number[tlsphi_corner(l, c, k)] = 0;
 }
 static void tlsphi_number_particles(tlsphi_lattice *l, size_t places) {
     for (size_t i = 0; i < places; i++) l->number[i] = TLSPHI_NONE;
@@ -4200,7 +4469,11 @@ static void tlsphi_number_particles(tlsphi_lattice *l, size_t places) {
         if (l->number[i] != TLSPHI_NONE) l->number[i] = (uint32_t)l->particles++;
 }
 
-typedef struct tlsphi_fill_target { tlsph_real *X, *V, *w, *share; uint32_t *cells; size_t cell; } tlsphi_fill_target;
+typedef struct tlsphi_fill_target {
+    tlsph_real *X, *V, *w, *share;
+    uint32_t *cells;
+    size_t cell;
+} tlsphi_fill_target;
 
 static void tlsphi_fill_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
     tlsphi_fill_target *t = (tlsphi_fill_target *)arg;
@@ -4216,7 +4489,8 @@ static void tlsphi_fill_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
     for (int k = 0; k < corners; k++) {
         const uint32_t a = l->number[tlsphi_corner(l, c, k)];
         for (int i = 0; i < 3; i++)
-            t->X[3 * a + (uint32_t)i] = i < l->fill->dimension ? (tlsph_real)l->line[i][c[i] + (size_t)(k >> i & 1)] : 0;
+            t->X[3 * a + (uint32_t)i] =
+                i < l->fill->dimension ? (tlsph_real)l->line[i][c[i] + (size_t)(k >> i & 1)] : 0;
         t->V[a] += (tlsph_real)(volume / corners);
         t->w[a] += (tlsph_real)volume; /* becomes the mean volume of the cells around a particle */
         t->share[a] += 1;
@@ -4232,7 +4506,8 @@ static double tlsphi_random(uint64_t *state) {
     z = (z ^ z >> 27) * 0x94d049bb133111ebu;
     return (double)((z ^ z >> 31) >> 11) / 9007199254740992.0;
 }
-/* Moves each coordinate by up to jitter x spacing; on-face particles only along axes in which cells lie on both sides. */
+/* Moves particles by up to jitter x spacing along each axis; on the faces of a box only within the face, on other
+   surfaces not at all. */
 static void tlsphi_jitter(const tlsphi_lattice *l, tlsph_real *X, const tlsph_real *share) {
     const tlsph_fill *f = l->fill;
     uint64_t state = f->seed;
@@ -4247,19 +4522,24 @@ static void tlsphi_jitter(const tlsphi_lattice *l, tlsph_real *X, const tlsph_re
         }
 }
 
-static tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const char *field, double value, const char *allowed) {
+static tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const char *field, double value,
+                                     const char *allowed) {
     return tlsphi_fail(error, r, "fill", field, TLSPH_NO_PARTICLE, value, 0, allowed);
 }
 static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
-    if (f->cookie != TLSPHI_COOKIE || f->dimension < 2 || f->dimension > 3 || (unsigned)f->shape > (unsigned)TLSPH_PREDICATE ||
-        (unsigned)f->placement > (unsigned)TLSPH_CELL_CENTRED || (f->shape == TLSPH_PREDICATE && !f->inside) || f->axis < 0 || f->axis > 2)
-        return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "cookie, dimension, shape, placement, axis or inside", f->dimension, "what tlsph_fill_default sets");
+    if (f->cookie != TLSPHI_COOKIE || f->dimension < 2 || f->dimension > 3 ||
+        (unsigned)f->shape > (unsigned)TLSPH_PREDICATE || (unsigned)f->placement > (unsigned)TLSPH_CELL_CENTRED ||
+        (f->shape == TLSPH_PREDICATE && !f->inside) || f->axis < 0 || f->axis > 2)
+        return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "cookie, dimension, shape, placement, axis or inside",
+                                f->dimension, "what tlsph_fill_default sets");
     if (!tlsphi_all_finite(f->origin, 3) || !tlsphi_all_finite(f->size, 3) || !tlsphi_finite(f->spacing))
         return tlsphi_fill_fail(error, TLSPH_ERROR_NOT_FINITE, "origin, size or spacing", (double)f->spacing, "finite");
     for (int i = 0; i < f->dimension; i++) {
-        if (!(f->size[i] > 0)) return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "size", (double)f->size[i], "more than 0");
+        if (!(f->size[i] > 0))
+            return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "size", (double)f->size[i], "more than 0");
         if (!(f->spacing > 0) || !((double)f->size[i] / (double)f->spacing < TLSPHI_LINES - 2))
-            return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "spacing", (double)f->spacing, "more than 0, fewer than 4094 cells an axis");
+            return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "spacing", (double)f->spacing,
+                                    "more than 0, fewer than 4094 cells an axis");
         if (f->shape == TLSPH_L_SHAPE && i < 2 && !(f->notch[i] > 0 && f->notch[i] < f->size[i]))
             return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "notch", (double)f->notch[i], "between 0 and size");
     }
@@ -4267,7 +4547,9 @@ static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
         return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "jitter", (double)f->jitter, "0 to 0.45");
     if (!f->allocator.allocate != !f->allocator.release)
         return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "allocator", 0, "both functions or neither");
-    return f->inner_radius >= 0 ? TLSPH_OK : tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "inner_radius", (double)f->inner_radius, "0 or more");
+    return f->inner_radius >= 0
+               ? TLSPH_OK
+               : tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "inner_radius", (double)f->inner_radius, "0 or more");
 }
 /* Lines, inside flags and numbers in one scratch block. */
 static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
@@ -4288,13 +4570,16 @@ static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
         if (pass) break;
         l->memory_size = arena.size = arena.used;
         l->memory = lines < 4294967295u ? l->allocator.allocate(l->allocator.user, l->memory_size) : NULL;
-        if (!l->memory) return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)l->memory_size, "what the allocator can give");
+        if (!l->memory)
+            return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)l->memory_size,
+                                    "what the allocator can give");
         arena.memory = (unsigned char *)l->memory;
     }
     for (int i = 0; i < l->fill->dimension; i++) tlsphi_axis_lines(l->fill, i, l->line[i]);
     tlsphi_each_cell(l, 1, tlsphi_test_cell, NULL);
     tlsphi_number_particles(l, l->fill->placement == TLSPH_CELL_CENTRED ? cells : lines);
-    return l->particles ? TLSPH_OK : tlsphi_fill_fail(error, TLSPH_ERROR_SIZE, "particles", 0, "at least 1; refine the spacing");
+    return l->particles ? TLSPH_OK
+                        : tlsphi_fill_fail(error, TLSPH_ERROR_SIZE, "particles", 0, "at least 1; refine the spacing");
 }
 static tlsph_result tlsphi_cloud_fill(tlsphi_lattice *l, tlsph_cloud *cloud, tlsph_error *error) {
     tlsphi_arena arena;
@@ -4313,7 +4598,9 @@ static tlsph_result tlsphi_cloud_fill(tlsphi_lattice *l, tlsph_cloud *cloud, tls
         if (pass) break;
         cloud->memory_size = arena.size = arena.used;
         cloud->memory = l->allocator.allocate(l->allocator.user, cloud->memory_size);
-        if (!cloud->memory) return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)cloud->memory_size, "what the allocator can give");
+        if (!cloud->memory)
+            return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)cloud->memory_size,
+                                    "what the allocator can give");
         arena.memory = (unsigned char *)cloud->memory;
         memset(cloud->memory, 0, cloud->memory_size);
     }
@@ -4364,7 +4651,8 @@ TLSPHI_DEF tlsph_fill tlsph_fill_default(int dimension) {
     f.axis = 2;
     return f;
 }
-TLSPHI_DEF size_t tlsph_select(const tlsph_particles *particles, tlsph_inside_fn inside, void *user, uint32_t *out, size_t capacity) {
+TLSPHI_DEF size_t tlsph_select(const tlsph_particles *particles, tlsph_inside_fn inside, void *user, uint32_t *out,
+                               size_t capacity) {
     size_t found = 0;
     for (size_t a = 0; a < particles->count; a++) {
         if (!inside(user, particles->positions + 3 * a)) continue;
@@ -4373,7 +4661,10 @@ TLSPHI_DEF size_t tlsph_select(const tlsph_particles *particles, tlsph_inside_fn
     }
     return found;
 }
-typedef struct tlsphi_plane { int axis; tlsph_real value, tolerance; } tlsphi_plane;
+typedef struct tlsphi_plane {
+    int axis;
+    tlsph_real value, tolerance;
+} tlsphi_plane;
 static int tlsphi_in_plane(void *user, const tlsph_real *X) {
     const tlsphi_plane *plane = (const tlsphi_plane *)user;
     return tlsphi_abs(X[plane->axis] - plane->value) <= plane->tolerance;
@@ -4405,5 +4696,5 @@ TLSPHI_DEF size_t tlsph_select_plane(const tlsph_particles *particles, int axis,
    OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE SOFTWARE.
 
    HISTORY
-   0.1  the core: container, corrected-kernel and cell operators, {p,F} to {p,F,H,J,E}, four materials and the user's own,
-        limited dissipation, two-stage Runge-Kutta step, conditions, ledger, checkpoints, lattice fillers. */
+   0.1  the core: container, corrected-kernel and cell operators, {p,F} to {p,F,H,J,E}, four materials and the user's
+        own, limited dissipation, two-stage Runge-Kutta step, conditions, ledger, checkpoints, lattice fillers. */

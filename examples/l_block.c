@@ -11,7 +11,7 @@ conserved, total energy constant, entropy growing and ballistic energy falling a
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- what is kept at which time -------------------------------------------------------------------------------------------- */
+/* ---- what is kept at which time ---------------------------------------------------------------------------------- */
 
 enum { FIGURE_5, FIGURE_6A, FIGURE_6B, FIGURE_9A, FIGURE_9B = FIGURE_9A + 5, SNAPSHOTS = FIGURE_9B + 5 };
 
@@ -98,7 +98,7 @@ static void after_step(driver *d) {
     track(r);
 }
 
-/* ---- the run ------------------------------------------------------------------------------------------------------------------ */
+/* ---- the run ----------------------------------------------------------------------------------------------------- */
 
 static int snap_due(run *r, double time) {
     int bad = 0;
@@ -130,7 +130,7 @@ static void simulate(run *r) {
     }
 }
 
-/* ---- pictures --------------------------------------------------------------------------------------------------------------- */
+/* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 static ex_view make_view(const char *label, const char *heading, ex_map map) {
     ex_view view;
@@ -179,7 +179,7 @@ static void draw_curves(run *r) {
     driver_plot(&r->base, "figure8_balances.png", &r->history, balances, 4, 2);
 }
 
-/* ---- checks ------------------------------------------------------------------------------------------------------------------ */
+/* ---- checks ------------------------------------------------------------------------------------------------------ */
 
 static void check(const run *r) {
     const double impulse = l_block_impulse(&r->block.parameters), angular = length3(r->released.angular_momentum);
@@ -203,7 +203,7 @@ static void check(const run *r) {
     ex_check_below("ballistic_largest_rise", r->worst.ballistic_step, 293.15 * entropy_scale);
 }
 
-/* ---- study of four resolutions: figure 5 and the costs ---------------------------------------------------------------- */
+/* ---- study of four resolutions: figure 5 and the costs ----------------------------------------------------------- */
 
 #define STUDIES 4
 #define SAMPLE 0.1 /* s between samples of the velocity at the probe */
@@ -323,7 +323,7 @@ static int run_studies(driver *d, const l_block_parameters *p) {
     return code;
 }
 
-/* ---- main ------------------------------------------------------------------------------------------------------------------------ */
+/* ---- main -------------------------------------------------------------------------------------------------------- */
 
 static int run_block(const l_block_parameters *p) {
     static run r; /* the block's loads point into it, and it is large */

@@ -7,7 +7,7 @@
 
 #define R(x) ((tlsph_real)(x))
 
-/* ---- tables with a header line ------------------------------------------------------------------------------------------ */
+/* ---- tables with a header line ----------------------------------------------------------------------------------- */
 
 typedef struct table { char *text; char *cells[4096]; size_t columns, rows; } table;
 
@@ -70,7 +70,7 @@ static inline tlsph_material table_material(const table *t, size_t row, const ch
     return m;
 }
 
-/* ---- free bodies --------------------------------------------------------------------------------------------------------- */
+/* ---- free bodies ------------------------------------------------------------------------------------------------- */
 
 /* A box of cells[i] cubic cells of 1/4 m with the paper's material; conditions may be added before scene_end. */
 static inline void box_begin(scene_setup *setup, int nx, int ny, int nz, const tlsph_material *material) {
@@ -105,7 +105,7 @@ static inline tlsph_result fixed_steps(tlsph_solver *solver, double dt, int coun
     return result;
 }
 
-/* ---- norms ----------------------------------------------------------------------------------------------------------------- */
+/* ---- norms ------------------------------------------------------------------------------------------------------- */
 
 /* Observed order from errors at spacings that halve from one entry to the next, over the whole list. */
 static inline double observed_order(const double *errors, int count) {

@@ -22,7 +22,7 @@ for command in "$@"; do
     fi
     { sh -c "$command" 2>&1; echo "$?" > "$log.code"; } | tee "$log"
     code=$(cat "$log.code"); rm -f "$log.code"
-    summary=$(tail -n 1 "$log" | grep -E '^[0-9]+ passed, [0-9]+ failed(, [0-9]+ skipped)?$')
+    summary=$(grep -v '^make' "$log" | tail -n 1 | grep -E '^[0-9]+ passed, [0-9]+ failed(, [0-9]+ skipped)?$')
     if [ -z "$summary" ]; then
         echo "FAIL $command: ended without a summary, exit code $code"
         failed=$((failed + 1))

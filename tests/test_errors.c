@@ -239,7 +239,7 @@ TEST(impossible_descriptions)
     BAD_VALUE(s.desc.jump_share = -1);
     BAD_VALUE(s.desc.drift_relaxation = -1);
     BAD_VALUE(s.desc.threads = -1);
-    BAD_VALUE(s.desc.particles.spacing = R(NAN));
+    REFUSED(s.desc.particles.spacing = R(NAN), TLSPH_ERROR_NOT_FINITE, TLSPH_NO_PARTICLE);
     BAD_VALUE(s.desc.particles.spacing = -1);
 }
 

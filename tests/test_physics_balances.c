@@ -1,7 +1,7 @@
 /* Balances: entropy production pair by pair, angular momentum with the projection, energy with every kind of load. */
 #include "physics.h"
 
-/* ---- entropy production -------------------------------------------------------------------------------------------------- */
+/* ---- entropy production ------------------------------------------------------------------------------------------ */
 
 /* Column of 1 x 1 x 6 m, E = 17 MPa, rho = 1100 kg/m^3, clamped at its foot and thrown into a twist:
    v = omega sin(pi Z / 12) (-Y, X, 0) about its axis (001 section 7.5). */
@@ -117,7 +117,7 @@ TEST(l_block_pair_production_pF_energy) { DOUBLE_ONLY(); block_audit(TLSPH_PF, T
 TEST(l_block_pair_production_pFHJ_energy) { DOUBLE_ONLY(); block_audit(TLSPH_PFHJ, TLSPH_ENERGY); }
 TEST(l_block_pair_production_pFHJ_entropy) { DOUBLE_ONLY(); block_audit(TLSPH_PFHJ, TLSPH_ENTROPY); }
 
-/* ---- projection ------------------------------------------------------------------------------------------------------------ */
+/* ---- projection -------------------------------------------------------------------------------------------------- */
 
 static const double lively = 1.5; /* 1/s: stretches of some 20 % in the paper's material */
 
@@ -246,7 +246,7 @@ TEST(projection_with_a_clamped_end_conserves_energy) {
     scene_destroy(&body);
 }
 
-/* ---- energy with every kind of load ----------------------------------------------------------------------------------- */
+/* ---- energy with every kind of load ------------------------------------------------------------------------------ */
 
 static void swing(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
                   const tlsph_real *x, tlsph_real *values) {

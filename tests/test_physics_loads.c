@@ -1,7 +1,7 @@
 /* Loads, walls, conduction and a tension test, each against a result that one can work out by hand. */
 #include "physics.h"
 
-/* ---- conduction -------------------------------------------------------------------------------------------------------- */
+/* ---- conduction -------------------------------------------------------------------------------------------------- */
 
 /* Temperatures that alternate from particle to particle; the spacing is 1/4 m. */
 static void odd_even(const void *scene, const tlsph_real X[3], scene_state *state) {
@@ -48,7 +48,7 @@ TEST(odd_even_temperature_stays_with_double_gradient) {
     CHECK_CLOSE(odd_even_left(TLSPH_DOUBLE_GRADIENT), 1, 1e3 * EPSILON);
 }
 
-/* ---- free fall ----------------------------------------------------------------------------------------------------------- */
+/* ---- free fall --------------------------------------------------------------------------------------------------- */
 
 TEST(free_fall_is_exact) {
     const tlsph_material material = scene_paper_material(TLSPH_NEO_HOOKEAN);
@@ -92,7 +92,7 @@ TEST(body_force_moves_the_centre_as_a_point) {
     scene_destroy(&body);
 }
 
-/* ---- pressure ------------------------------------------------------------------------------------------------------------ */
+/* ---- pressure ---------------------------------------------------------------------------------------------------- */
 
 /* A quarter turn about Z. */
 static void quarter_turn(const void *scene, const tlsph_real X[3], scene_state *state) {
@@ -130,7 +130,7 @@ TEST(pressure_follows_the_turned_normal) {
     scene_destroy(&body);
 }
 
-/* ---- wall ---------------------------------------------------------------------------------------------------------------- */
+/* ---- wall -------------------------------------------------------------------------------------------------------- */
 
 static void towards_the_wall(const void *scene, const tlsph_real X[3], scene_state *state) {
     (void)X;
@@ -179,7 +179,7 @@ static void bounce(tlsph_thermal thermal) {
 TEST(bar_bounces_off_a_wall_isothermal) { DOUBLE_ONLY(); bounce(TLSPH_ISOTHERMAL); }
 TEST(bar_bounces_off_a_wall_energy) { DOUBLE_ONLY(); bounce(TLSPH_ENERGY); }
 
-/* ---- tension test -------------------------------------------------------------------------------------------------------- */
+/* ---- tension test ------------------------------------------------------------------------------------------------ */
 
 /* Axial stress of a bar with free sides at stretch l: lateral stretch found by bisection on the lateral stress. */
 static double uniaxial_stress(const tlsph_material *material, double l) {

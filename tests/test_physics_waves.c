@@ -1,7 +1,7 @@
 /* Waves, shocks and rotations with exact solutions: references/README says where each comes from. */
 #include "physics.h"
 
-/* ---- thermo-elastic standing wave ------------------------------------------------------------------------------------- */
+/* ---- thermo-elastic standing wave -------------------------------------------------------------------------------- */
 
 TEST(standing_wave_root_is_that_of_the_table) {
     static table t;
@@ -107,7 +107,7 @@ TEST(standing_wave_second_order_energy_form) { DOUBLE_ONLY(); wave_order(TLSPH_E
 TEST(standing_wave_second_order_entropy_form) { DOUBLE_ONLY(); wave_order(TLSPH_ENTROPY, 2); }
 TEST(standing_wave_higher_order_pairs) { DOUBLE_ONLY(); wave_order(TLSPH_ENERGY, 4); }
 
-/* ---- swinging cube ----------------------------------------------------------------------------------------------------- */
+/* ---- swinging cube ----------------------------------------------------------------------------------------------- */
 
 TEST(swinging_cube_formula_is_that_of_the_table) {
     static table t;
@@ -161,7 +161,7 @@ TEST(swinging_cube_errors_and_order) {
     CHECK(observed_order(error_P, 3) >= 1.8);
 }
 
-/* ---- finite shear wave --------------------------------------------------------------------------------------------------- */
+/* ---- finite shear wave ------------------------------------------------------------------------------------------- */
 
 static shear_wave_parameters shear_row(const table *t, size_t row) {
     shear_wave_parameters p;
@@ -226,7 +226,7 @@ static void shear_order(size_t first, size_t last) {
 TEST(shear_wave_second_order) { DOUBLE_ONLY(); shear_order(0, 1); }
 TEST(slow_shear_wave_second_order_all_materials) { DOUBLE_ONLY(); shear_order(1, 100); }
 
-/* ---- rotation with pulsating stretch ----------------------------------------------------------------------------------- */
+/* ---- rotation with pulsating stretch ----------------------------------------------------------------------------- */
 
 TEST(pulsating_rotation_formula_is_that_of_the_table) {
     static table t;
@@ -301,7 +301,7 @@ TEST(pulsating_rotation_second_order_pFJ_energy) { DOUBLE_ONLY(); rotation_order
 TEST(pulsating_rotation_second_order_pFHJ_energy) { DOUBLE_ONLY(); rotation_order(TLSPH_PFHJ, TLSPH_ENERGY); }
 TEST(pulsating_rotation_second_order_pFHJ_entropy) { DOUBLE_ONLY(); rotation_order(TLSPH_PFHJ, TLSPH_ENTROPY); }
 
-/* ---- symmetric impact ------------------------------------------------------------------------------------------------------ */
+/* ---- symmetric impact -------------------------------------------------------------------------------------------- */
 
 static impact_parameters impact_row(const table *t, size_t row) {
     impact_parameters p;
@@ -351,17 +351,12 @@ static impact_outcome impact_star_state(tlsph_unknowns unknowns, tlsph_dissipati
     return worst;
 }
 
-/* Shocks are what first-order dissipation is for. */
-TEST(impact_star_states_without_overshoot_pF) {
+TEST(impact_star_states_pF) { DOUBLE_ONLY(); CHECK_BELOW(impact_star_state(TLSPH_PF, TLSPH_LIMITED).overshoot, 0.05); }
+TEST(impact_star_states_pFHJ) { DOUBLE_ONLY(); CHECK_BELOW(impact_star_state(TLSPH_PFHJ, TLSPH_LIMITED).overshoot, 0.05); }
+TEST(impact_star_states_first_order) {
     DOUBLE_ONLY();
     CHECK_BELOW(impact_star_state(TLSPH_PF, TLSPH_FIRST_ORDER).overshoot, 0.05);
 }
-TEST(impact_star_states_without_overshoot_pFHJ) {
-    DOUBLE_ONLY();
-    CHECK_BELOW(impact_star_state(TLSPH_PFHJ, TLSPH_FIRST_ORDER).overshoot, 0.05);
-}
-/* The default keeps order 2 elsewhere and pays with 25 to 45 % of overshoot right behind a front; its star states hold. */
-TEST(impact_star_states_limited) { DOUBLE_ONLY(); impact_star_state(TLSPH_PFHJ, TLSPH_LIMITED); }
 
 SUITE(physics_waves, ENTRY(standing_wave_root_is_that_of_the_table), ENTRY(standing_wave_fit_finds_a_known_root),
       ENTRY(standing_wave_frequency_and_damping_energy_form), ENTRY(standing_wave_frequency_and_damping_entropy_form),
@@ -372,5 +367,5 @@ SUITE(physics_waves, ENTRY(standing_wave_root_is_that_of_the_table), ENTRY(stand
       ENTRY(slow_shear_wave_second_order_all_materials), ENTRY(pulsating_rotation_formula_is_that_of_the_table),
       ENTRY(pulsating_rotation_second_order_pF_energy), ENTRY(pulsating_rotation_second_order_pF_entropy),
       ENTRY(pulsating_rotation_second_order_pFJ_energy), ENTRY(pulsating_rotation_second_order_pFHJ_energy),
-      ENTRY(pulsating_rotation_second_order_pFHJ_entropy), ENTRY(impact_star_states_without_overshoot_pF),
-      ENTRY(impact_star_states_without_overshoot_pFHJ), ENTRY(impact_star_states_limited))
+      ENTRY(pulsating_rotation_second_order_pFHJ_entropy), ENTRY(impact_star_states_pF),
+      ENTRY(impact_star_states_pFHJ), ENTRY(impact_star_states_first_order))

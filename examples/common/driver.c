@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- command line and errors -------------------------------------------------------------------------------------------- */
+/* ---- command line and errors ------------------------------------------------------------------------------------- */
 
 #define OWN_OPTIONS 32
 
@@ -33,7 +33,7 @@ int driver_error(const tlsph_error *e) {
     return 3;
 }
 
-/* ---- ledger ---------------------------------------------------------------------------------------------------------------- */
+/* ---- ledger ------------------------------------------------------------------------------------------------------ */
 
 /* Every column of ledger.csv with where it stands in tlsph_ledger. */
 #define LEDGER_COLUMNS(X)                                                                                              \
@@ -63,7 +63,7 @@ static void write_ledger(driver *d) {
     ex_csv_row(&d->ledger, row);
 }
 
-/* ---- frames ------------------------------------------------------------------------------------------------------------------ */
+/* ---- frames ------------------------------------------------------------------------------------------------------ */
 
 double *driver_read(const scene_body *body, tlsph_field field) {
     const size_t count = tlsph_count(body->solver) * (size_t)tlsph_field_components(field);
@@ -96,7 +96,7 @@ static void write_frame(driver *d) {
     free(positions);
 }
 
-/* ---- running ------------------------------------------------------------------------------------------------------------------ */
+/* ---- running ----------------------------------------------------------------------------------------------------- */
 
 const char *driver_path(driver *d, const char *file) {
     static char path[1024];
@@ -154,7 +154,7 @@ int driver_end(driver *d) {
     return code;
 }
 
-/* ---- pictures ------------------------------------------------------------------------------------------------------------------ */
+/* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 int driver_snap(const scene_body *body, tlsph_field field, int component, double scale, driver_snapshot *out) {
     const size_t components = (size_t)tlsph_field_components(field);

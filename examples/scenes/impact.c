@@ -9,7 +9,6 @@ void impact_default(impact_parameters *p) {
     memset(p, 0, sizeof *p);
     scene_options_default(&p->options);
     p->options.thermal = TLSPH_ENERGY; /* entropy is not conserved through a shock, energy is */
-    p->options.dissipation = TLSPH_FIRST_ORDER; /* the limited form overshoots by 25 % and more behind a front */
     p->options.end_time = 0.04;        /* the shocks are at +-0.34 m then, the free ends still unaware */
     p->options.threads = 1;            /* some thousand particles */
     p->n = 200;

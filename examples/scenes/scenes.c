@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- options ---------------------------------------------------------------------------------------------------------- */
+/* ---- options ----------------------------------------------------------------------------------------------------- */
 
 void scene_options_default(scene_options *options) {
     const tlsph_desc desc = tlsph_desc_default(3); /* the library's own choices, so that they stand in one place */
@@ -78,7 +78,7 @@ void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->cfl = (tlsph_real)options->cfl;
 }
 
-/* ---- construction ------------------------------------------------------------------------------------------------------ */
+/* ---- construction ------------------------------------------------------------------------------------------------ */
 
 void scene_begin(scene_setup *setup, const tlsph_fill *fill, const tlsph_material *material, tlsph_error *error) {
     memset(setup, 0, sizeof *setup);
@@ -245,7 +245,7 @@ void scene_destroy(scene_body *body) {
     memset(body, 0, sizeof *body);
 }
 
-/* ---- reading ------------------------------------------------------------------------------------------------------------ */
+/* ---- reading ----------------------------------------------------------------------------------------------------- */
 
 tlsph_real *scene_read(const tlsph_solver *solver, tlsph_field field) {
     const size_t values = tlsph_count(solver) * (size_t)tlsph_field_components(field);

@@ -18,7 +18,7 @@ Nothing here prints or writes files; driver.h does that for the examples.
 
 #define SCENE_PI 3.14159265358979323846
 
-/* ---- options common to all scenes ---------------------------------------------------------------------------------- */
+/* ---- options common to all scenes -------------------------------------------------------------------------------- */
 
 /* What every scene lets one choose. Integers are those of the enumerations in tlsph.h. */
 typedef struct scene_options {
@@ -38,7 +38,7 @@ void scene_options_default(scene_options *options);
 void scene_option_table(scene_options *options, ex_option *table);
 void scene_options_apply(const scene_options *options, tlsph_desc *desc);
 
-/* ---- a body under construction -------------------------------------------------------------------------------------- */
+/* ---- a body under construction ----------------------------------------------------------------------------------- */
 
 typedef struct scene_body {
     tlsph_cloud cloud;
@@ -83,7 +83,7 @@ typedef void (*scene_state_fn)(const void *scene, const tlsph_real X[3], scene_s
 tlsph_result scene_set_state(scene_body *body, const void *scene, scene_state_fn state);
 void scene_destroy(scene_body *body);
 
-/* ---- reading ---------------------------------------------------------------------------------------------------------- */
+/* ---- reading ----------------------------------------------------------------------------------------------------- */
 
 /* A copy of a field, to be freed; NULL without memory or where the scene lacks the field. */
 tlsph_real *scene_read(const tlsph_solver *solver, tlsph_field field);
@@ -99,7 +99,7 @@ double scene_expansion(const tlsph_material *material, double delta);
 /* P-wave modulus lambda + 2 mu, bulk modulus kappa and shear modulus mu, Pa. */
 void scene_moduli(const tlsph_material *material, double *p_wave, double *bulk, double *shear);
 
-/* ---- L-shaped block: 000 section 7.2 ---------------------------------------------------------------------------------- */
+/* ---- L-shaped block: 000 section 7.2 ----------------------------------------------------------------------------- */
 
 typedef struct l_block_parameters {
     scene_options options;
@@ -121,7 +121,7 @@ tlsph_result l_block_create(const l_block_parameters *parameters, l_block *out, 
 /* Impulse of one of the two forces over the whole loading, N s: the scale of momenta in this scene. */
 double l_block_impulse(const l_block_parameters *parameters);
 
-/* ---- thermo-elastic standing wave (references/README, thermoelastic_standing_wave.csv) -------------------------------- */
+/* ---- thermo-elastic standing wave (references/README, thermoelastic_standing_wave.csv) --------------------------- */
 
 typedef struct standing_wave_parameters {
     scene_options options;
@@ -165,7 +165,7 @@ double standing_wave_end(const standing_wave *wave);
 /* Runs to that time and fits. `step` is called after each step with `user`; it may be NULL. */
 tlsph_result standing_wave_measure(standing_wave *wave, double s[2], void (*step)(void *user), void *user);
 
-/* ---- swinging cube: 001 section 7.1, METHOD sections 4 to 6, swinging_cube_t0.002.csv --------------------------------- */
+/* ---- swinging cube: 001 section 7.1, METHOD sections 4 to 6, swinging_cube_t0.002.csv ---------------------------- */
 
 typedef struct swinging_cube_parameters {
     scene_options options;
@@ -190,7 +190,7 @@ void swinging_cube_exact(const swinging_cube *cube, const tlsph_real X[3], doubl
 /* Relative L2 errors of p_x and P_xX now, over the particles. */
 void swinging_cube_errors(const swinging_cube *cube, double *error_p, double *error_P);
 
-/* ---- finite circularly polarised shear wave: finite_shear_wave.csv ---------------------------------------------------- */
+/* ---- finite circularly polarised shear wave: finite_shear_wave.csv ----------------------------------------------- */
 
 /* x = (l X + A cos q, l Y + A sin q, l3 Z), q = k Z - w t: exact in nonlinear elasticity without any force. */
 typedef struct shear_wave_parameters {
@@ -217,7 +217,7 @@ void shear_wave_exact(const shear_wave *wave, const tlsph_real X[3], double t, d
    on the surface gradients are one-sided, first order, and the stress there disturbs a layer below it. */
 void shear_wave_errors(const shear_wave *wave, double depth, double *error_v, double *error_F);
 
-/* ---- rotation with pulsating stretch: rotation_with_pulsating_stretch.csv --------------------------------------------- */
+/* ---- rotation with pulsating stretch: rotation_with_pulsating_stretch.csv ---------------------------------------- */
 
 /* F(t) = R(2 pi t about Z) diag(1 + 0.2 sin 3t, 1 + 0.1 (1 - cos 4t), 1 - 0.15 sin 2t), body force rho F'' X,
    theta(0) = 310 K, adiabatic. */
@@ -239,7 +239,7 @@ tlsph_result pulsating_rotation_create(const pulsating_rotation_parameters *para
 /* F, F' and F'' at t. */
 void pulsating_rotation_exact(double t, double F[9], double rate[9], double second[9]);
 
-/* ---- symmetric impact: riemann_star_states.csv ------------------------------------------------------------------------- */
+/* ---- symmetric impact: riemann_star_states.csv ------------------------------------------------------------------- */
 
 typedef struct impact_parameters {
     scene_options options;

@@ -145,7 +145,7 @@ void standing_wave_errors(const standing_wave *wave, double *error_u, double *er
     *error_theta = volume > 0 ? sqrt(sum_T / volume) / b : HUGE_VAL;
 }
 
-/* ---- frequency and damping ---------------------------------------------------------------------------------------------- */
+/* ---- frequency and damping --------------------------------------------------------------------------------------- */
 
 /* Solves the 4x4 system m x = r by Gaussian elimination with pivoting; x comes in r. Returns 0 if it could. */
 static int solve4(double m[4][4], double r[4]) {
