@@ -20,7 +20,7 @@ bench.c - what a right-hand side costs, in ns per particle (a step has two of th
 
 #ifdef TLSPH_REAL_FLOAT
 #define PRECISION "float"
-#define BALANCE 1e-3 /* of the kinetic energy: rounding of E, which is stored as float */
+#define BALANCE 5e-3 /* of the kinetic energy: rounding of E, which is stored as float */
 #else
 #define PRECISION "double"
 #define BALANCE 1e-10
@@ -127,8 +127,8 @@ static void fail(bench_case *c, const char *message) {
     c->failed = 1;
 }
 
-/* v_i = 0.01 c_p sin(pi X_i) cos(pi X_j) cos(pi X_k). Smooth, and the limiter has work nearly
-   everywhere. */
+/* v_i = 0.01 c_p sin(pi X_i) cos(pi X_j) cos(pi X_k). Smooth, and in motion nearly everywhere, so
+   that no branch is taken more often than in a real scene. */
 static tlsph_result set_motion(const bench_case *c, const tlsph_cloud *cloud, const tlsph_material *material) {
     double p_wave, bulk, shear;
     tlsph_real *v = calloc(3 * cloud->particles.count, sizeof *v);
@@ -218,13 +218,12 @@ static int create_clouds(bench *b, const bench_scale *scale) {
     return 0;
 }
 
-/* The solvers of the first round go even if they could stay, which gives creation a second sample. */
 static int run_rounds(bench *b, const bench_scale *scale) {
     const double deadline = ex_seconds() + scale->seconds;
     int round = 0;
     for (int i = 0; i < b->case_count; i++) b->cases[i].creation = b->cases[i].step = HUGE_VAL;
     for (; round < scale->least || (round < scale->most && ex_seconds() < deadline); round++)
-        for (int i = 0; i < b->case_count; i++) visit(b, b->cases + i, scale->steps, scale->keep && round > 0);
+        for (int i = 0; i < b->case_count; i++) visit(b, b->cases + i, scale->steps, scale->keep);
     for (int i = 0; i < b->case_count; i++) tlsph_destroy(b->cases[i].solver);
     return round;
 }

@@ -20,6 +20,7 @@ void scene_options_default(scene_options *options) {
     options->volume_coupling = (int)desc.volume_coupling;
     options->conduction = (int)desc.conduction;
     options->integrator = (int)desc.integrator;
+    options->sharp = desc.sharp_gradients;
     options->projection = desc.projection;
     options->frames = 20;
     options->output = "";
@@ -55,6 +56,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = choice("volume", &o->volume_coupling, "split|printed", "how an evolved J enters the energy");
     table[i++] = choice("conduction", &o->conduction, "compact|double", "heat conduction's stencil");
     table[i++] = choice("integrator", &o->integrator, "rk2", "time integrator");
+    table[i++] = whole("sharp", &o->sharp, 0, 1, "1: gradients of fourth-order dispersion (lattices only)");
     table[i++] = whole("projection", &o->projection, 0, 1, "1: conserve angular momentum exactly (000-79 to 82)");
     table[i++] = whole("threads", &o->threads, 0, 4096, "threads; 0: OpenMP's own choice");
     table[i++] = whole("frames", &o->frames, 0, 100000, "frames written as VTK files");
@@ -72,6 +74,7 @@ void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->volume_coupling = (tlsph_volume_coupling)options->volume_coupling;
     desc->conduction = (tlsph_conduction)options->conduction;
     desc->integrator = (tlsph_integrator)options->integrator;
+    desc->sharp_gradients = options->sharp;
     desc->projection = options->projection;
     desc->audit = options->audit;
     desc->threads = options->threads;
@@ -241,7 +244,6 @@ tlsph_result scene_set_state(scene_body *body, const void *scene, scene_state_fn
 void scene_destroy(scene_body *body) {
     tlsph_destroy(body->solver);
     if (body->cloud.memory) tlsph_cloud_destroy(&body->cloud);
-    free(body->operator_memory);
     memset(body, 0, sizeof *body);
 }
 

@@ -25,12 +25,12 @@ typedef struct scene_options {
     double end_time;             /* s */
     double cfl, support;
     int unknowns, thermal, operator_kind, kernel, dissipation, volume_coupling, conduction, integrator;
-    int projection, audit, threads;
+    int sharp, projection, audit, threads;
     int frames, quiet;           /* used by drivers only */
     const char *output;
 } scene_options;
 
-#define SCENE_OPTION_COUNT 16
+#define SCENE_OPTION_COUNT 17
 
 /* The library's own defaults, no end time, one frame. */
 void scene_options_default(scene_options *options);
@@ -44,7 +44,6 @@ typedef struct scene_body {
     tlsph_cloud cloud;
     tlsph_material material;
     tlsph_solver *solver;
-    void *operator_memory; /* of scene_fourth_order, or NULL */
 } scene_body;
 
 #define SCENE_CONDITIONS 16
@@ -70,10 +69,6 @@ tlsph_condition *scene_add_where(scene_setup *setup, tlsph_condition_kind kind, 
 void scene_add_rollers(scene_setup *setup, int axis);
 /* Shares the area of a plane face among the condition's particles by their tributary volumes, so that it adds up. */
 void scene_share_area(scene_setup *setup, tlsph_condition *condition, double area);
-/* Replaces volumes and pairs of a box lattice by fourth-order lines along `axis` (summation by parts 4-2, METHOD section 6)
-   and the usual pairs across; needs 8 spacings along the axis and the operator TLSPH_GIVEN. The stencil of second order
-   makes waves (kh)^2/6 too slow, this one (kh)^4/30. */
-void scene_fourth_order(scene_setup *setup, int dimension, int axis);
 /* Creates the solver from all of it. `out` owns the result; empty on error. */
 tlsph_result scene_end(scene_setup *setup, const scene_options *options, scene_body *out, tlsph_error *error);
 /* Position, velocity, deformation gradient and temperature of a material point; filled with X, 0, I, theta_R before. */
@@ -128,7 +123,6 @@ typedef struct standing_wave_parameters {
     int dimension;        /* 2 or 3 */
     int n;                /* spacings a wavelength, even */
     int across;           /* spacings across the bar */
-    int order;            /* 2: the library's lattice operator; 4: scene_fourth_order, from n = 16 */
     double length;        /* m; half a wavelength */
     double delta;         /* thermo-elastic coupling */
     double conductivity;  /* W/(m K) */

@@ -15,6 +15,7 @@ void swinging_cube_default(swinging_cube_parameters *p) {
     memset(p, 0, sizeof *p);
     scene_options_default(&p->options);
     p->options.end_time = 0.002; /* 001 table 1 */
+    p->options.sharp = 1;
     p->n = 16;
     p->amplitude = 5e-7;         /* so small that every material is linear (METHOD section 4) */
     p->young = 17e6; p->poisson = 0.3; p->density = 1100;
@@ -58,11 +59,16 @@ static tlsph_material make_material(const swinging_cube_parameters *p) {
 tlsph_result swinging_cube_create(const swinging_cube_parameters *p, swinging_cube *out, tlsph_error *error) {
     const tlsph_material material = make_material(p);
     tlsph_fill fill = tlsph_fill_default(3);
+    scene_options options = p->options;
     double p_wave, bulk, shear;
     scene_setup setup;
     tlsph_result result;
     memset(out, 0, sizeof *out);
     out->parameters = *p;
+    if (p->jitter > 0) { /* no lattice: six neighbours are too few, and C is not antisymmetric */
+        options.sharp = 0;
+        options.support = fmax(options.support, 0.9);
+    }
     scene_moduli(&material, &p_wave, &bulk, &shear);
     out->omega = sqrt(3) / 2 * SCENE_PI * sqrt(p_wave / p->density);
     fill.size[0] = fill.size[1] = fill.size[2] = 1;
@@ -73,7 +79,7 @@ tlsph_result swinging_cube_create(const swinging_cube_parameters *p, swinging_cu
         scene_add_plane(&setup, TLSPH_ROLLER, axis, 0);
         scene_add_plane(&setup, TLSPH_TANGENT, axis, 1);
     }
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, initial_state);
     if (result != TLSPH_OK) scene_destroy(&out->body);
     return result;
