@@ -1287,7 +1287,12 @@ static tlsph_result tlsphi_cells_build(tlsphi_plan *plan) {
                                     (double)p->cells[i], (double)plan->n, "less than the number of particles");
         plan->cell_first[p->cells[i] + 2]++;
     }
-    for (size_t a = 0; a < plan->n; a++) plan->cell_first[a + 2] += plan->cell_first[a + 1];
+    for (size_t a = 0; a < plan->n; a++) {
+        if (plan->cell_first[a + 2] > (size_t)1 << plan->dim)
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "cells around it", a, (double)plan->cell_first[a + 2],
+                                    (double)(1 << plan->dim), "at most 8 (2-D: 4): cells of a lattice, each once");
+        plan->cell_first[a + 2] += plan->cell_first[a + 1];
+    }
     for (size_t i = 0; i < corners; i++)
         plan->cell_of[plan->cell_first[p->cells[i] + 1]++] = (uint32_t)(i >> plan->dim);
     for (size_t c = 0; c < p->cell_count; c++) {
@@ -1306,6 +1311,22 @@ static tlsph_result tlsphi_cells_build(tlsphi_plan *plan) {
     return TLSPH_OK;
 }
 
+/* Size of C_ab + C_ba over that of C_ab for the i-th given pair, which belongs to a; 1 where there is no C_ba. */
+static double tlsphi_given_asymmetry(const tlsphi_plan *plan, size_t a, size_t i) {
+    const tlsph_particles *p = &plan->desc->particles;
+    const size_t b = p->neighbours[i];
+    for (size_t j = p->first[b]; j < p->first[b + 1]; j++) {
+        double sum = 0, size = 0;
+        if (p->neighbours[j] != a) continue;
+        for (size_t k = 0; k < (size_t)plan->dim; k++) {
+            const double mine = (double)p->pair_vectors[3 * i + k], other = (double)p->pair_vectors[3 * j + k];
+            sum += (mine + other) * (mine + other);
+            size += mine * mine + other * other;
+        }
+        return size > 0 ? sqrt(sum / size) : 0;
+    }
+    return 1;
+}
 static tlsph_result tlsphi_given_check(tlsphi_plan *plan) {
     const tlsph_particles *p = &plan->desc->particles;
     for (size_t a = 0; a < plan->n; a++) {
@@ -1320,6 +1341,13 @@ static tlsph_result tlsphi_given_check(tlsphi_plan *plan) {
                 return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "pair vector", a, (double)i, 0, "finite");
         }
     }
+    for (size_t a = 0; a < plan->n; a++)
+        for (size_t i = p->first[a]; i < p->first[a + 1]; i++) {
+            const double defect = tlsphi_given_asymmetry(plan, a, i), limit = TLSPHI_EPSILON > 1e-10 ? 1e-5 : 1e-10;
+            if (!(defect <= limit))
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "|C_ab + C_ba| / |C_ab|", a, defect, limit,
+                                        "C_ab = -C_ba, with each pair in both lists");
+        }
     return TLSPH_OK;
 }
 
@@ -1553,8 +1581,9 @@ TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_
    the invariants; the 2x2 eigenvalue is then a bound. It is exact at F = I, where dropping the mixed terms would give
    kappa + 8/3 mu instead of kappa + 4/3 mu. */
 typedef struct tlsphi_invariants {
-    tlsph_real I1, I2, J, L1, LH, l3;
-} tlsphi_invariants; /* largest of F^T F, of H^T H; least of F^T F */
+    tlsph_real I1, I2, J;  /* F:F, H:H, det F */
+    tlsph_real L1, LH, l3; /* bounds: largest eigenvalue of F^T F and of H^T H, least of F^T F */
+} tlsphi_invariants;
 
 TLSPHI_INLINE tlsphi_invariants tlsphi_principal_bounds(tlsph_real I1, tlsph_real I2, tlsph_real J) {
     tlsphi_invariants s;
