@@ -1892,8 +1892,9 @@ struct tlsph_solver {
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
     /* what neighbours read: velocity, P M, A = H M, (c_p, c_s, rho, drift ratio), Sigma_J and its gradient,
        temperature and its gradient, M^T Q/theta, h/J; w is v without the body's rigid motion, as the dissipation sees it
-       (without projection w and grad_w are v and grad_v). Without sharp gradients rate_F and P_flux are grad_v and PM */
-    tlsph_real *w, *grad_w, *v, *grad_v, *P_flux, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
+       (without projection w and grad_w are v and grad_v). Without sharp gradients rate_F, slope_w and P_flux are grad_v,
+       grad_w and PM */
+    tlsph_real *w, *grad_w, *slope_w, *v, *grad_v, *P_flux, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
     /* conditions */
     tlsphi_fix *fix;
     tlsphi_mirror *mirror;
@@ -2393,8 +2394,13 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
    and its adjoint, by which the forces must be made so that energy and momenta stay exact,
      P^_a = P_a + 1/(6 V_a) sum_b ((P_a - P_b) C_ab) (x) d.
    On a lattice the symbol sin k becomes sin k (1 + (1 - cos k)/3) = k + O(k^5): fourth order, at 1.37 times the largest
-   frequency. Needs C_ab = -C_ba. */
-#define TLSPHI_SHARP_FREQUENCY 1.37
+   frequency. Needs C_ab = -C_ba.
+   The dissipation reconstructs with g + r (G - g). With s = sin(k/2) it then damps 2 s^3 (1 - 2 r/3) + O(s^5) of a wave
+   instead of 2 s^3: r = 3/2 would leave fifth order, but the two-stage scheme amplifies waves by (omega dt)^4/8 a step,
+   which a little of the third order must outweigh, diagonal waves in 3-D included: 1 - 2 r/3 > 6 nu^3 with nu the Courant
+   number over TLSPHI_SHARP_STEP. At CFL 0.3 that is 0.067 > 0.048. */
+#define TLSPHI_SHARP_STEP 1.5 /* shortens the time step: 1.37 and a margin */
+#define TLSPHI_SHARP_REACH 1.4 /* r */
 
 /* correction: sum_b ((g_b - g_a) d) (x) C_ab;  moment: sum_b ((P_a - P_b) C_ab) (x) d */
 TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
@@ -2421,20 +2427,21 @@ static void tlsphi_mirror_all(const tlsph_solver *s, size_t a, tlsph_real *G) {
 }
 TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int dim) {
     const size_t dd = (size_t)(dim * dim);
-    const tlsph_real sixth = 1 / (6 * s->V[a]);
+    const tlsph_real sixth = 1 / (6 * s->V[a]), reach = sixth * TLSPHI_R(TLSPHI_SHARP_REACH);
     tlsph_real correction[9] = {0}, moment[9] = {0}, relative[9] = {0};
     tlsphi_sharp_sums(s, a, dim, s->grad_v, correction, moment);
+    if (s->projection) tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL);
+    else memcpy(relative, correction, sizeof relative);
     tlsphi_mirror_all(s, a, correction);
+    tlsphi_mirror_all(s, a, relative);
     tlsphi_mirror_all(s, a, moment);
     for (size_t i = 0; i < dd; i++) {
         s->rate_F[dd * a + i] = s->grad_v[dd * a + i] - sixth * correction[i];
+        s->slope_w[dd * a + i] = s->grad_w[dd * a + i] - reach * relative[i];
         s->P_flux[dd * a + i] = s->PM[dd * a + i] + sixth * moment[i];
     }
     if (s->rate_J) tlsphi_jacobian_rate(s, a);
-    if (!s->rate_E) return;
-    if (s->projection)
-        tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL); /* PM is mirrored, so `relative` need not be */
-    s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, s->PM + dd * a, s->projection ? relative : correction);
+    if (s->rate_E) s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, s->PM + dd * a, relative);
 }
 static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
     for (size_t a = block->begin; a < block->end; a++) {
@@ -2462,7 +2469,6 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t
                                          const int kind, tlsphi_gathered *sum, tlsph_real *production) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *w_a = s->wave + 4 * a, *w_b = s->wave + 4 * b, *v_a = s->w + D * a, *v_b = s->w + D * b;
-    const tlsph_real *G_a = s->grad_w + dd * a, *G_b = s->grad_w + dd * b;
     const tlsph_real cc = tlsphi_dot(dim, c, c), CC = tlsphi_sqrt(tlsphi_dot(dim, C, C)), inverse = 1 / tlsphi_sqrt(cc);
     const tlsph_real rho = (w_a[2] + w_b[2]) / 2, c_p = (w_a[0] + w_b[0]) / 2, c_s = (w_a[1] + w_b[1]) / 2;
     tlsph_real n[3], d[3], Dv[3], Dr[3], D_p[3], D_J = 0, DS = 0;
@@ -2471,14 +2477,14 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t
         d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
         Dv[i] = v_b[i] - v_a[i];
     }
-    tlsphi_multiply_mean(dim, G_a, G_b, d, Dr);
+    tlsphi_multiply_mean(dim, s->slope_w + dd * a, s->slope_w + dd * b, d, Dr);
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dr[i] = Dv[i] - Dr[i];
     const tlsph_real raw = tlsphi_dot(dim, n, Dv);
     tlsph_real front = 0;
     if (kind == TLSPH_LIMITED && raw < -TLSPHI_R(TLSPHI_FRONT_LOW) * c_p) {
         tlsph_real Gd_a[3], Gd_b[3];
-        tlsphi_multiply(dim, G_a, d, Gd_a);
-        tlsphi_multiply(dim, G_b, d, Gd_b);
+        tlsphi_multiply(dim, s->grad_w + dd * a, d, Gd_a);
+        tlsphi_multiply(dim, s->grad_w + dd * b, d, Gd_b);
         front = tlsphi_front(raw, tlsphi_dot(dim, n, Gd_a), tlsphi_dot(dim, n, Gd_b), c_p);
     }
     tlsphi_damp_velocity(dim, kind, Dv, Dr, n, front, rho * CC / 2, c_p, c_s, D_p);
@@ -4003,6 +4009,7 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
     s->P_flux = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->PM;
     s->grad_w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->grad_v;
+    s->slope_w = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->grad_w;
     if (s->has_J) {
         s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
         s->S = TLSPHI_TAKE(arena, tlsph_real, n);
@@ -4158,7 +4165,7 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         }
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
         s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum /
-                                 (s->sharp ? TLSPHI_SHARP_FREQUENCY : 1));
+                                 (s->sharp ? TLSPHI_SHARP_STEP : 1));
     }
 }
 static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {

@@ -48,7 +48,7 @@ static void draw(run *r) {
 /* Targets at 32 particles a wavelength: frequency within 0.5 %, damping within 10 %. Where conduction is so weak that
    the wave hardly loses anything in a period, the scheme's own loss must be small by the frequency instead. */
 static void report(const standing_wave *wave, const double s[2]) {
-    const double tolerance = fmax(0.1 * fabs(wave->s[0]), 1e-3 * wave->s[1]);
+    const double tolerance = fmax(0.1 * fabs(wave->s[0]), 1e-4 * wave->s[1]);
     double error_u, error_theta;
     standing_wave_errors(wave, &error_u, &error_theta);
     ex_result("frequency", s[1], "rad/s");
