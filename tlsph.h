@@ -1864,6 +1864,8 @@ typedef struct tlsphi_account {
 typedef struct tlsphi_body {
     uint32_t first;                       /* particle */
     double volume, inertia[9], centre[3]; /* of the stage's positions */
+    int turns;                            /* axes about which its mirror planes let it turn: 3, 1 (`axis`) or 0 */
+    double axis[3];
     double v_mean[3], spin[3];            /* rigid motion nearest to v */
     double lambda[3], linear[3];          /* multipliers of the projection */
 } tlsphi_body;
@@ -2920,7 +2922,12 @@ static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt)
    sum w.D_p = -sum over pairs Dw.D_p, exactly what the dissipation, evaluated with w, gives to the particles as heat:
    the energy is conserved and no entropy is destroyed. For the same reason the stresses heat by P : grad w; it differs
    from P : dF/dt only because the last stage takes torques about x^{n+1}, by O(dt^2). Works with constraints, which take
-   their part of T^ as reaction, and body by body. */
+   their part of T^ as reaction, and body by body.
+
+   Mirror planes. The rules of the mirror (see [GRADIENTS]) hold for w only if they hold for the rigid motion. So spin and
+   lambda are restricted to what the planes of a body allow: a roller plane turns about its normal, planes of two
+   directions or a tangentially fixed one do not turn at all. Nothing is lost: about the other axes the planes exert
+   torques of their own. */
 
 typedef struct tlsphi_projection {
     tlsph_solver *s;
@@ -2987,6 +2994,17 @@ static void tlsphi_torque_task(void *arg, size_t i) {
         }
     }
 }
+/* x with I x = moment, within the turns that the body's mirror planes allow. */
+static void tlsphi_turn(const tlsphi_body *body, const double moment[3], double x[3]) {
+    double stiffness = 0;
+    if (body->turns == 3) {
+        tlsphi_solve_symmetric(body->inertia, moment, x);
+        return;
+    }
+    for (int i = 0; i < 9; i++) stiffness += body->axis[i / 3] * body->inertia[i] * body->axis[i % 3];
+    const double turn = body->turns && stiffness > 0 ? tlsphi_dot3(body->axis, moment) / stiffness : 0;
+    for (int i = 0; i < 3; i++) x[i] = turn * body->axis[i];
+}
 /* Rigid motion of a body from its moments: centre, inertia (both with V as weight), mean velocity and spin. */
 static void tlsphi_rigid_motion(tlsphi_body *body, const double *m) {
     const double V = body->volume = m[0];
@@ -3004,7 +3022,7 @@ static void tlsphi_rigid_motion(tlsphi_body *body, const double *m) {
     I[1] = I[3] = -(m[9] - V * c[0] * c[1]);
     tlsphi_cross3(c, m + 10, moment);
     for (int i = 0; i < 3; i++) moment[i] = m[13 + i] - moment[i];
-    tlsphi_solve_symmetric(I, moment, body->spin);
+    tlsphi_turn(body, moment, body->spin);
 }
 static void tlsphi_multipliers(tlsphi_body *body, const double *m) {
     double torque[3];
@@ -3013,7 +3031,7 @@ static void tlsphi_multipliers(tlsphi_body *body, const double *m) {
         torque[i] -= m[3 + i];
         body->linear[i] = -m[i] / body->volume;
     }
-    tlsphi_solve_symmetric(body->inertia, torque, body->lambda);
+    tlsphi_turn(body, torque, body->lambda);
 }
 /* w = v - rigid motion. */
 static void tlsphi_relative_task(void *arg, size_t i) {
@@ -4183,8 +4201,8 @@ static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
 static void tlsphi_fill_mirrors(tlsph_solver *s, const tlsphi_plan *plan) {
     if (!s->mirrors) return;
     for (size_t a = 0; a < s->n; a++) s->mirror_of[a] = 0;
-    for (int pass = 0; pass < 2;
-         pass++) { /* count, then place; mirror_of counts up to each particle's end and is walked back */
+    /* count, then place: mirror_of first counts up to each particle's end, then is walked back */
+    for (int pass = 0; pass < 2; pass++) {
         for (size_t k = 0; k < plan->desc->condition_count; k++) {
             const tlsph_condition *c = plan->desc->conditions + k;
             if (c->kind != TLSPH_ROLLER && c->kind != TLSPH_TANGENT) continue;
@@ -4208,6 +4226,22 @@ static void tlsphi_fill_mirrors(tlsph_solver *s, const tlsphi_plan *plan) {
     s->mirror[s->mirrors].particle = TLSPHI_NONE;
     for (size_t a = 0; a < s->n; a++)
         if (s->mirror[s->mirror_of[a]].particle != a) s->mirror_of[a] = TLSPHI_NONE;
+}
+/* What the mirror planes leave of the three axes about which a body may turn (see [PROJECTION]). */
+static void tlsphi_fill_turns(tlsph_solver *s) {
+    for (size_t i = 0; i < s->bodies; i++) s->body[i].turns = 3;
+    for (size_t i = 0; i < s->blocks; i++) {
+        tlsphi_body *body = s->body + s->block[i].body;
+        for (size_t a = s->block[i].begin; a < s->block[i].end; a++)
+            for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
+                const double N[3] = {(double)m->N[0], (double)m->N[1], (double)m->N[2]};
+                const int same = body->turns == 1 && fabs(tlsphi_dot3(body->axis, N)) > 1 - 1e-6;
+                if (m->tangent || (body->turns < 3 && !same)) body->turns = 0;
+                if (body->turns < 3) continue;
+                body->turns = 1;
+                memcpy(body->axis, N, sizeof N);
+            }
+    }
 }
 /* Reference area of a load on one particle: given, or from the operator's boundary vector. */
 static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, const tlsph_condition *c, size_t i) {
@@ -4286,6 +4320,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     tlsphi_fill_pairs(s, plan, list, g);
     tlsphi_fill_fixes(s, plan);
     tlsphi_fill_mirrors(s, plan);
+    tlsphi_fill_turns(s);
     tlsphi_fill_loads(s, plan);
     s->fingerprint = tlsphi_fingerprint(s);
     tlsphi_no_error(&s->error);
