@@ -345,7 +345,7 @@ typedef struct tlsph_size {
    first step, or tlsph_ledger_reset. */
 typedef struct tlsph_ledger {
     double time; uint64_t step; double time_step;
-    double mass, linear_momentum[3], angular_momentum[3]; /* about the origin */
+    double mass, linear_momentum[3], angular_momentum[3]; /* x x p about the origin; linear materials only: X x p */
     double centre[3];                                     /* centre of mass */
     double kinetic_energy;
     double strain_energy;    /* e_R (thermal) or Helmholtz energy at theta_R (isothermal) */
@@ -1871,7 +1871,8 @@ typedef struct tlsphi_body {
 } tlsphi_body;
 
 struct tlsph_solver {
-    int dim, thermal, has_H, has_J, sharp, corrected, conducts, has_user, audit, projection, dissipation_heats, threads;
+    int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user;
+    int audit, projection, dissipation_heats, threads;
     tlsph_dissipation dissipation;
     tlsph_volume_coupling coupling;
     tlsph_conduction conduction;
@@ -2732,13 +2733,16 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
     load->given.values(load->given.values_user, (tlsph_real)time, count, load->host, load->X, load->x, load->values);
 }
 
-/* Where forces of this stage act, so that the angular balance of the step closes (see [PROJECTION]). */
+/* Where forces of this stage act, so that the angular balance of the step closes (see [PROJECTION]). Linear elasticity
+   takes moments about the reference positions: there P is symmetric, not P F^T, and X x p is what is conserved. */
 static void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double X[3]) {
     const size_t D = (size_t)s->dim;
     X[2] = 0;
     for (size_t i = 0; i < D; i++) {
-        const double x = (double)s->now.x[D * a + i];
-        X[i] = stage->last ? stage->a * (double)s->old.x[D * a + i] + stage->b * (x + dt * (double)s->v[D * a + i]) : x;
+        const double x = (double)s->now.x[D * a + i], was = (double)s->old.x[D * a + i];
+        X[i] = x;
+        if (stage->last) X[i] = stage->a * was + stage->b * (x + dt * (double)s->v[D * a + i]);
+        if (s->linear) X[i] = (double)s->X[D * a + i];
     }
 }
 
@@ -3283,14 +3287,15 @@ static void tlsphi_ledger_particle(const tlsph_solver *s, size_t a, tlsph_ledger
     const size_t D = (size_t)s->dim;
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const double V = (double)s->V[a];
-    double x[3] = {0, 0, 0}, p[3] = {0, 0, 0}, xp[3];
+    double x[3] = {0, 0, 0}, p[3] = {0, 0, 0}, arm[3] = {0, 0, 0}, xp[3];
     tlsphi_point pt;
     tlsphi_constitute(s, &s->now, a, NULL, &pt);
     for (size_t i = 0; i < D; i++) {
         x[i] = (double)s->now.x[D * a + i];
         p[i] = V * (double)s->now.p[D * a + i];
+        arm[i] = s->linear ? (double)s->X[D * a + i] : x[i];
     }
-    tlsphi_cross3(x, p, xp);
+    tlsphi_cross3(arm, p, xp);
     out->mass += V * (double)m->rho;
     for (int i = 0; i < 3; i++) {
         out->linear_momentum[i] += p[i];
@@ -3981,7 +3986,9 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->material_count = d->material_count;
     s->run = d->run;
     s->run_user = d->run_user;
+    s->linear = 1;
     for (size_t i = 0; i < d->material_count; i++) {
+        s->linear &= d->materials[i].kind == TLSPH_LINEAR;
         s->conducts |= s->thermal && d->materials[i].conductivity > 0;
         s->has_user |= d->materials[i].kind == TLSPH_USER;
     }
