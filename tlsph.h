@@ -60,8 +60,8 @@ PROMISES
 
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [MATERIALS]
-  [DISSIPATION] [GRADIENTS] [FLUXES] [CONDITIONS] [RHS] [PROJECTION] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION]
-  [CREATION] [FILL] [LICENCE]
+  [SOLVER-DATA] [EVALUATION] [DISSIPATION] [GRADIENTS] [FLUXES] [CONDITIONS] [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS]
+  [CHECKPOINT] [VALIDATION] [CREATION] [FILL] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -1804,7 +1804,7 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
     return TLSPH_OK;
 }
 
-/* ==== [SOLVER DATA] ================================================================================================
+/* ==== [SOLVER-DATA] ================================================================================================
    All arrays are in the solver's order and lie in one block. D = dimension, DD = D * D. Optional arrays are NULL where
    the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
    so their value does not depend on the threads. */
@@ -1969,7 +1969,9 @@ static void tlsphi_cross3(const double a[3], const double b[3], double out[3]) {
 }
 static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/* -- the state of one particle, evaluated: Algorithm 1 lines (8), (9) -- */
+/* ==== [EVALUATION] =================================================================================================
+   Algorithm 1 lines (8) and (9): stress, temperature, wave speeds of each particle from its state, and what neighbours
+   read of it. */
 
 typedef struct tlsphi_point {
     tlsph_real F[9], H[9], d, J; /* d = det F (linear: 1 + tr eps) */
