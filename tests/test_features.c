@@ -13,8 +13,7 @@ typedef struct body {
     double kinetic; /* J, right after the start */
 } body;
 
-static int body_make(body *b, int dimension, int nx, int ny, int nz)
-{
+static int body_make(body *b, int dimension, int nx, int ny, int nz) {
     int cells[3];
     cells[0] = nx;
     cells[1] = ny;
@@ -30,15 +29,13 @@ static int body_make(body *b, int dimension, int nx, int ny, int nz)
     return 1;
 }
 
-static void body_destroy(body *b)
-{
+static void body_destroy(body *b) {
     tlsph_destroy(b->solver);
     own_cloud_destroy(&b->cloud);
 }
 
 /* Writes a smooth velocity with spin and no mean, a finite stretch that varies, and a warm side. */
-static tlsph_result write_state(body *b, double speed, double stretch)
-{
+static tlsph_result write_state(body *b, double speed, double stretch) {
     size_t a, n = b->cloud.particles.count;
     tlsph_real *v = calloc(3 * n, sizeof *v), *F = calloc(9 * n, sizeof *F), *theta = calloc(n, sizeof *theta);
     tlsph_result result = TLSPH_OK;
@@ -64,11 +61,13 @@ static tlsph_result write_state(body *b, double speed, double stretch)
 }
 
 /* Creates the solver and gives it the state; the ledger counts from there. */
-static int body_start(body *b, double speed, double stretch)
-{
+static int body_start(body *b, double speed, double stretch) {
     tlsph_error error;
     tlsph_ledger l;
-    if (!CHECK_RESULT(tlsph_create(&b->desc, &b->solver, &error), TLSPH_OK)) { printf("    %s\n", error.message); return 0; }
+    if (!CHECK_RESULT(tlsph_create(&b->desc, &b->solver, &error), TLSPH_OK)) {
+        printf("    %s\n", error.message);
+        return 0;
+    }
     if (!CHECK_RESULT(write_state(b, speed, stretch), TLSPH_OK)) return 0;
     tlsph_ledger_reset(b->solver);
     tlsph_ledger_read(b->solver, &l);
@@ -76,16 +75,14 @@ static int body_start(body *b, double speed, double stretch)
     return 1;
 }
 
-static tlsph_result steps_of(tlsph_solver *solver, double dt, int count)
-{
+static tlsph_result steps_of(tlsph_solver *solver, double dt, int count) {
     tlsph_result result = TLSPH_OK;
     while (count-- > 0 && !result) result = tlsph_step(solver, R(dt));
     return result;
 }
 
 /* Largest difference of a field between two solvers over its largest value. */
-static double difference(const body *one, const body *other, tlsph_field field)
-{
+static double difference(const body *one, const body *other, tlsph_field field) {
     size_t i, count = tlsph_count(one->solver) * (size_t)tlsph_field_components(field);
     tlsph_real *f = read_field(one->solver, field), *g = read_field(other->solver, field);
     double size = f ? largest(f, count) : 0, worst = f && g ? 0 : HUGE_VAL;
@@ -98,8 +95,7 @@ static double difference(const body *one, const body *other, tlsph_field field)
     return worst / (size > 0 ? size : 1);
 }
 
-static void check_same_state(const body *one, const body *other, double tolerance)
-{
+static void check_same_state(const body *one, const body *other, double tolerance) {
     CHECK_BELOW(difference(one, other, TLSPH_FIELD_POSITION), tolerance);
     CHECK_BELOW(difference(one, other, TLSPH_FIELD_VELOCITY), tolerance);
     CHECK_BELOW(difference(one, other, TLSPH_FIELD_F), tolerance);
@@ -110,8 +106,7 @@ static void check_same_state(const body *one, const body *other, double toleranc
 }
 
 /* Largest component of what linear momentum has changed, over mass x velocity. */
-static double momentum_lost(const body *b)
-{
+static double momentum_lost(const body *b) {
     tlsph_ledger l;
     tlsph_ledger_read(b->solver, &l);
     return fmax(fabs(l.linear_residual[0]), fmax(fabs(l.linear_residual[1]), fabs(l.linear_residual[2]))) /
@@ -129,8 +124,7 @@ typedef struct twin {
     uint8_t *seen;              /* only the first evaluation of each */
 } twin;
 
-static void twin_watch(twin *t, size_t count, const uint32_t *particle, const tlsph_real *F)
-{
+static void twin_watch(twin *t, size_t count, const uint32_t *particle, const tlsph_real *F) {
     size_t i;
     if (count > t->largest_batch) t->largest_batch = count;
     for (i = 0; t->expected && i < count; i++) {
@@ -142,8 +136,7 @@ static void twin_watch(twin *t, size_t count, const uint32_t *particle, const tl
 }
 
 /* The wave speeds are bounds and no physics, so they may be asked of the library: rho c^2 at two temperatures. */
-static void twin_moduli(const twin *t, const tlsph_real *F, tlsph_response *out)
-{
+static void twin_moduli(const twin *t, const tlsph_real *F, tlsph_response *out) {
     const tlsph_real low = t->model.reference_temperature, rho = t->model.density;
     tlsph_material_state cold, hot;
     memset(&cold, 0, sizeof cold);
@@ -157,11 +150,11 @@ static void twin_moduli(const twin *t, const tlsph_real *F, tlsph_response *out)
 }
 
 /* psi = mu/2 (d^-2/3 F:F - 3) with d = det F, u = kappa/2 (J-1)^2, eta_R = beta (J-1), e_R = psi + u + beta theta_R (J-1). */
-static void twin_one(const twin *t, const tlsph_real *F, tlsph_real J, tlsph_response *out)
-{
+static void twin_one(const twin *t, const tlsph_real *F, tlsph_real J, tlsph_response *out) {
     const tlsph_material *m = &t->model;
     const double mu = (double)m->young / (2 * (1 + (double)m->poisson));
-    const double kappa = (double)m->young / (3 * (1 - 2 * (double)m->poisson)), theta_R = (double)m->reference_temperature;
+    const double kappa = (double)m->young / (3 * (1 - 2 * (double)m->poisson)),
+                 theta_R = (double)m->reference_temperature;
     const double beta = m->kind == TLSPH_MIE_GRUNEISEN ? 3 * kappa * (double)m->expansion : 0;
     const double d = (double)tlsph_determinant(F), j = (double)J - 1, slope = kappa * j + beta * theta_R;
     const double a = mu * pow(d, -2.0 / 3);
@@ -181,8 +174,7 @@ static void twin_one(const twin *t, const tlsph_real *F, tlsph_real J, tlsph_res
 }
 
 static void twin_response(void *user, size_t count, const uint32_t *particle, const tlsph_real *F, const tlsph_real *J,
-                          tlsph_response *out)
-{
+                          tlsph_response *out) {
     twin *t = user;
     size_t i;
     twin_watch(t, count, particle, F);
@@ -192,8 +184,7 @@ static void twin_response(void *user, size_t count, const uint32_t *particle, co
     }
 }
 
-static void make_twin(twin *t, tlsph_material *m, int all_in_F)
-{
+static void make_twin(twin *t, tlsph_material *m, int all_in_F) {
     memset(t, 0, sizeof *t);
     t->model = *m;
     t->all_in_F = all_in_F;
@@ -203,8 +194,7 @@ static void make_twin(twin *t, tlsph_material *m, int all_in_F)
 }
 
 /* Host numbers that are no order in space: particle i becomes 7 i mod n. */
-static void shuffle(own_cloud *cloud)
-{
+static void shuffle(own_cloud *cloud) {
     size_t i, n = cloud->particles.count;
     own_cloud old;
     if (!CHECK(own_copy(&old, &cloud->particles, 3))) return;
@@ -217,11 +207,15 @@ static void shuffle(own_cloud *cloud)
     own_cloud_destroy(&old);
 }
 
-typedef struct law { tlsph_material_kind kind; tlsph_unknowns unknowns; tlsph_thermal thermal; int all_in_F; } law;
+typedef struct law {
+    tlsph_material_kind kind;
+    tlsph_unknowns unknowns;
+    tlsph_thermal thermal;
+    int all_in_F;
+} law;
 
 /* 6 x 5 x 4 = 120 particles: no multiple of the 32 that a call takes at most, and coprime to 7. */
-static int twin_pair(const law *l, body *builtin, body *user, twin *t)
-{
+static int twin_pair(const law *l, body *builtin, body *user, twin *t) {
     body *both[2];
     int i;
     both[0] = builtin;
@@ -240,8 +234,7 @@ static int twin_pair(const law *l, body *builtin, body *user, twin *t)
     return 1;
 }
 
-static void check_twin(const law *l)
-{
+static void check_twin(const law *l) {
     const double tolerance = ROUNDED(1e-10, 4e3);
     body builtin, user;
     twin t;
@@ -259,16 +252,14 @@ static void check_twin(const law *l)
     body_destroy(&user);
 }
 
-TEST(user_neo_hookean_is_the_built_in_one)
-{
+TEST(user_neo_hookean_is_the_built_in_one) {
     static const law split = {TLSPH_NEO_HOOKEAN, TLSPH_PF, TLSPH_ISOTHERMAL, 0};
     static const law joint = {TLSPH_NEO_HOOKEAN, TLSPH_PF, TLSPH_ISOTHERMAL, 1};
     check_twin(&split);
     check_twin(&joint);
 }
 
-TEST(user_mie_gruneisen_is_the_built_in_one)
-{
+TEST(user_mie_gruneisen_is_the_built_in_one) {
     static const law split = {TLSPH_MIE_GRUNEISEN, TLSPH_PF, TLSPH_ENERGY, 0};
     static const law joint = {TLSPH_MIE_GRUNEISEN, TLSPH_PF, TLSPH_ENERGY, 1};
     static const law entropy = {TLSPH_MIE_GRUNEISEN, TLSPH_PF, TLSPH_ENTROPY, 0};
@@ -280,8 +271,7 @@ TEST(user_mie_gruneisen_is_the_built_in_one)
 }
 
 /* Every particle carries its own F; the callback must find it under the host's number. */
-TEST(user_material_gets_host_numbers_in_batches)
-{
+TEST(user_material_gets_host_numbers_in_batches) {
     static const law l = {TLSPH_NEO_HOOKEAN, TLSPH_PF, TLSPH_ISOTHERMAL, 0};
     body builtin, user;
     twin t;
@@ -311,8 +301,7 @@ TEST(user_material_gets_host_numbers_in_batches)
 
 /* ---- two materials ---- */
 
-static void stiff_half(body *b, int checkered)
-{
+static void stiff_half(body *b, int checkered) {
     size_t a;
     b->desc.material_count = 2;
     b->materials[1].young *= 4;
@@ -320,19 +309,17 @@ static void stiff_half(body *b, int checkered)
     for (a = 0; a < b->cloud.particles.count; a++) {
         const tlsph_real *X = b->cloud.positions + 3 * a;
         int sum = (int)(4 * (double)X[0] + 0.5) + (int)(4 * (double)X[1] + 0.5) + (int)(4 * (double)X[2] + 0.5);
-        b->cloud.materials[a] = checkered ? (uint8_t)(sum % 2) : (double)X[0] > 0.6;
+        b->cloud.materials[a] = (uint8_t)(checkered ? sum % 2 : (double)X[0] > 0.6);
     }
 }
 
 /* sqrt((kappa + 4/3 mu)/rho) of the undeformed material */
-static double p_speed(const tlsph_material *m)
-{
+static double p_speed(const tlsph_material *m) {
     double nu = (double)m->poisson;
     return sqrt((double)m->young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / (double)m->density);
 }
 
-static void check_sets(const body *b)
-{
+static void check_sets(const body *b) {
     tlsph_real *c = read_field(b->solver, TLSPH_FIELD_P_WAVE_SPEED), *M = read_field(b->solver, TLSPH_FIELD_MASS);
     double mass = 0;
     tlsph_ledger l;
@@ -350,8 +337,7 @@ static void check_sets(const body *b)
     free(M);
 }
 
-TEST(two_materials)
-{
+TEST(two_materials) {
     static const tlsph_unknowns unknowns[2] = {TLSPH_PF, TLSPH_PFHJ};
     int i;
     for (i = 0; i < 2; i++) {
@@ -379,8 +365,7 @@ TEST(two_materials)
 }
 
 /* A user's material beside a built-in one, particle by particle, is what two built-in ones give. */
-TEST(user_and_built_in_materials_mix)
-{
+TEST(user_and_built_in_materials_mix) {
     body b[2];
     twin t;
     int i, ready = 1;
@@ -406,17 +391,19 @@ TEST(user_and_built_in_materials_mix)
 /* ---- given pair vectors ---- */
 
 /* Pair lists in the host's numbering. */
-typedef struct pair_lists { size_t *first; uint32_t *neighbours; tlsph_real *vectors; } pair_lists;
+typedef struct pair_lists {
+    size_t *first;
+    uint32_t *neighbours;
+    tlsph_real *vectors;
+} pair_lists;
 
-static void lists_destroy(pair_lists *lists)
-{
+static void lists_destroy(pair_lists *lists) {
     free(lists->first);
     free(lists->neighbours);
     free(lists->vectors);
 }
 
-static void lists_of(const tlsph_solver *solver, pair_lists *lists)
-{
+static void lists_of(const tlsph_solver *solver, pair_lists *lists) {
     tlsph_operator view;
     size_t a, k, i, at = 0, *inner;
     tlsph_operator_view(solver, &view);
@@ -436,16 +423,14 @@ static void lists_of(const tlsph_solver *solver, pair_lists *lists)
     free(inner);
 }
 
-static void use_lists(body *b, const pair_lists *lists)
-{
+static void use_lists(body *b, const pair_lists *lists) {
     b->desc.operator_kind = TLSPH_GIVEN;
     b->desc.particles.first = lists->first;
     b->desc.particles.neighbours = lists->neighbours;
     b->desc.particles.pair_vectors = lists->vectors;
 }
 
-static void thermal_cells(body *b, int sharp)
-{
+static void thermal_cells(body *b, int sharp) {
     b->materials[0] = soft_material(TLSPH_MIE_GRUNEISEN);
     b->desc.operator_kind = TLSPH_CELLS;
     b->desc.thermal = TLSPH_ENERGY;
@@ -453,8 +438,7 @@ static void thermal_cells(body *b, int sharp)
     b->desc.sharp_gradients = sharp;
 }
 
-static void check_given(int dimension, int sharp)
-{
+static void check_given(int dimension, int sharp) {
     body cells, given;
     pair_lists lists;
     double dt;
@@ -477,24 +461,21 @@ static void check_given(int dimension, int sharp)
     body_destroy(&given);
 }
 
-TEST(given_pair_vectors_of_cells_give_the_same_motion)
-{
+TEST(given_pair_vectors_of_cells_give_the_same_motion) {
     check_given(2, 0);
     check_given(3, 0);
     check_given(3, 1);
 }
 
 /* Multiplies the vector of one pair in the middle; with `both`, that of its partner as well. */
-static void spoil_pair(pair_lists *lists, size_t a, double factor, int both)
-{
+static void spoil_pair(pair_lists *lists, size_t a, double factor, int both) {
     size_t i = lists->first[a], b = lists->neighbours[i], j, k;
     for (k = 0; k < 3; k++) lists->vectors[3 * i + k] *= R(factor);
     for (j = lists->first[b]; both && j < lists->first[b + 1]; j++)
         for (k = 0; k < 3 && lists->neighbours[j] == a; k++) lists->vectors[3 * j + k] *= R(factor);
 }
 
-TEST(given_pair_vectors_must_be_antisymmetric_and_exact)
-{
+TEST(given_pair_vectors_must_be_antisymmetric_and_exact) {
     static const tlsph_result expected[2] = {TLSPH_ERROR_ARGUMENT, TLSPH_ERROR_NEIGHBOURS};
     body b;
     int both;
@@ -523,8 +504,7 @@ TEST(given_pair_vectors_must_be_antisymmetric_and_exact)
 /* A free body of {p,F} and neo-Hookean material, conducting where the caller makes it thermal; 125 or 49 particles. On so
    few the shortest waves are as strong as the long ones, and what the two-stage scheme adds to their energy, (w dt)^4/4 a
    step, is 4 % of the kinetic energy at the default CFL number (see the next test); hence 0.1. */
-static int variant_make(body *b, int dimension)
-{
+static int variant_make(body *b, int dimension) {
     int cells = dimension == 3 ? 4 : 6;
     if (!body_make(b, dimension, cells, cells, cells)) return 0;
     b->desc.cfl = R(0.1);
@@ -532,8 +512,7 @@ static int variant_make(body *b, int dimension)
 }
 
 /* 30 steps; the energy may grow by `growth` of the kinetic energy at most. Destroys the body. */
-static void variant_run(body *b, double growth, const char *name)
-{
+static void variant_run(body *b, double growth, const char *name) {
     tlsph_ledger before, after;
     double gain = HUGE_VAL, lost = HUGE_VAL;
     int fine = body_start(b, 0.4, 0);
@@ -549,13 +528,14 @@ static void variant_run(body *b, double growth, const char *name)
         fine &= CHECK_BELOW(lost, ROUNDED(1e-12, 1e3));
         fine &= CHECK(after.jacobian_least > 0.5 && after.temperature_least > 250 && after.temperature_largest < 350);
     }
-    if (!fine) printf("    %s, %d-D: energy %+.2e of the kinetic, momentum off by %.1e\n", name, b->desc.dimension, gain, lost);
+    if (!fine)
+        printf("    %s, %d-D: energy %+.2e of the kinetic, momentum off by %.1e\n", name, b->desc.dimension, gain,
+               lost);
     body_destroy(b);
 }
 
 /* Without dissipation the energy grows by the time scheme only: third order in dt over a given time. */
-static double undamped_gain(double cfl, double time)
-{
+static double undamped_gain(double cfl, double time) {
     tlsph_ledger before, after;
     double gain;
     body b;
@@ -571,8 +551,7 @@ static double undamped_gain(double cfl, double time)
     return gain;
 }
 
-TEST(undamped_energy_grows_by_the_time_scheme_only)
-{
+TEST(undamped_energy_grows_by_the_time_scheme_only) {
     double coarse, fine;
     DOUBLE_ONLY();
     coarse = undamped_gain(0.2, 0.25);
@@ -584,14 +563,12 @@ TEST(undamped_energy_grows_by_the_time_scheme_only)
 
 static const char *const thermal_name[3] = {"isothermal", "energy", "entropy"};
 
-static void thermal_body(body *b, int thermal)
-{
+static void thermal_body(body *b, int thermal) {
     b->desc.thermal = (tlsph_thermal)thermal;
     if (thermal) b->materials[0] = soft_material(TLSPH_MIE_GRUNEISEN);
 }
 
-TEST(every_dissipation_runs)
-{
+TEST(every_dissipation_runs) {
     int kind, thermal, dimension;
     for (kind = TLSPH_LIMITED; kind <= TLSPH_NO_DISSIPATION; kind++)
         for (thermal = 0; thermal < 3; thermal++)
@@ -606,8 +583,7 @@ TEST(every_dissipation_runs)
             }
 }
 
-TEST(every_set_of_unknowns_and_thermal_form_runs)
-{
+TEST(every_set_of_unknowns_and_thermal_form_runs) {
     int unknowns, thermal, dimension;
     for (unknowns = TLSPH_PF; unknowns <= TLSPH_PFH; unknowns++)
         for (thermal = 0; thermal < 3; thermal++)
@@ -622,8 +598,7 @@ TEST(every_set_of_unknowns_and_thermal_form_runs)
             }
 }
 
-TEST(printed_volume_coupling_and_relaxation_run)
-{
+TEST(printed_volume_coupling_and_relaxation_run) {
     int has_H, thermal, relaxed;
     for (has_H = 0; has_H < 2; has_H++)
         for (thermal = 0; thermal < 3; thermal++)
@@ -641,8 +616,7 @@ TEST(printed_volume_coupling_and_relaxation_run)
             }
 }
 
-TEST(every_kernel_and_support_runs)
-{
+TEST(every_kernel_and_support_runs) {
     static const double supports[3] = {0.6, 0.9, 1.2};
     int kernel, i, dimension;
     for (kernel = TLSPH_CUBIC_SPLINE; kernel <= TLSPH_QUADRATIC; kernel++)
@@ -658,8 +632,7 @@ TEST(every_kernel_and_support_runs)
             }
 }
 
-TEST(sharp_gradients_and_projection_run)
-{
+TEST(sharp_gradients_and_projection_run) {
     int sharp, projection, thermal, dimension;
     for (sharp = 0; sharp < 2; sharp++)
         for (projection = 0; projection < 2; projection++)
@@ -672,16 +645,21 @@ TEST(sharp_gradients_and_projection_run)
                     b.desc.operator_kind = TLSPH_CELLS;
                     b.desc.sharp_gradients = sharp;
                     b.desc.projection = projection;
-                    snprintf(name, sizeof name, "sharp %d, projection %d, %s", sharp, projection, thermal_name[thermal]);
+                    snprintf(name, sizeof name, "sharp %d, projection %d, %s", sharp, projection,
+                             thermal_name[thermal]);
                     variant_run(&b, 1e-3, name);
                 }
 }
 
-TEST(every_conduction_and_material_runs)
-{
-    static const struct { const char *name; tlsph_material_kind kind; double q, mooney; } laws[4] = {
-        {"MEE, Mooney 0.4", TLSPH_MEE, 1, 0.4}, {"MG, q = 0", TLSPH_MIE_GRUNEISEN, 0, 0},
-        {"MG, q = 0.5", TLSPH_MIE_GRUNEISEN, 0.5, 0}, {"MG, q = 0.5, Mooney 0.4", TLSPH_MIE_GRUNEISEN, 0.5, 0.4}};
+TEST(every_conduction_and_material_runs) {
+    static const struct {
+        const char *name;
+        tlsph_material_kind kind;
+        double q, mooney;
+    } laws[4] = {{"MEE, Mooney 0.4", TLSPH_MEE, 1, 0.4},
+                 {"MG, q = 0", TLSPH_MIE_GRUNEISEN, 0, 0},
+                 {"MG, q = 0.5", TLSPH_MIE_GRUNEISEN, 0.5, 0},
+                 {"MG, q = 0.5, Mooney 0.4", TLSPH_MIE_GRUNEISEN, 0.5, 0.4}};
     int i, conduction, thermal, dimension;
     for (i = 0; i < 4; i++)
         for (conduction = TLSPH_COMPACT; conduction <= TLSPH_DOUBLE_GRADIENT; conduction++)
@@ -696,14 +674,14 @@ TEST(every_conduction_and_material_runs)
                     b.desc.conduction = (tlsph_conduction)conduction;
                     b.desc.thermal = (tlsph_thermal)thermal;
                     b.desc.unknowns = dimension == 3 ? TLSPH_PFHJ : TLSPH_PF;
-                    snprintf(name, sizeof name, "%s, conduction %d, %s", laws[i].name, conduction, thermal_name[thermal]);
+                    snprintf(name, sizeof name, "%s, conduction %d, %s", laws[i].name, conduction,
+                             thermal_name[thermal]);
                     variant_run(&b, 1e-3, name);
                 }
 }
 
 /* Its stress is no tensor of the deformed body: the torque about x that the projection takes away must not cost energy. */
-TEST(linear_material_runs_with_and_without_projection)
-{
+TEST(linear_material_runs_with_and_without_projection) {
     int projection, thermal, dimension;
     for (projection = 0; projection < 2; projection++)
         for (thermal = 0; thermal < 3; thermal++)
@@ -722,8 +700,7 @@ TEST(linear_material_runs_with_and_without_projection)
 /* ---- sharp gradients ---- */
 
 /* The gradient of v = A X after a step so small that nothing has changed. */
-static void check_affine(int dimension, int projection)
-{
+static void check_affine(int dimension, int projection) {
     static const tlsph_real A[9] = {R(0.3), R(-1.1), R(0.7), R(0.9), R(-0.2), R(0.5), R(-0.4), R(0.6), R(0.8)};
     size_t a, n, i, k, D = (size_t)dimension;
     tlsph_real *v, *G;
@@ -749,8 +726,7 @@ static void check_affine(int dimension, int projection)
     body_destroy(&b);
 }
 
-TEST(sharp_gradients_are_exact_for_affine_fields)
-{
+TEST(sharp_gradients_are_exact_for_affine_fields) {
     check_affine(2, 0);
     check_affine(2, 1);
     check_affine(3, 0);
@@ -758,8 +734,7 @@ TEST(sharp_gradients_are_exact_for_affine_fields)
 }
 
 /* Largest |dv/dX - symbol 2 cos 2X| in the middle of a bar for v = sin 2X, where the stencil with k h = 1/2 sees no end. */
-static double off_symbol(int sharp, double symbol)
-{
+static double off_symbol(int sharp, double symbol) {
     size_t a, n;
     double worst = 0;
     tlsph_real *v, *G;
@@ -784,15 +759,13 @@ static double off_symbol(int sharp, double symbol)
 }
 
 /* sin k/k and sin k (1 + (1 - cos k)/3)/k at k = 1/2: 4 % and 0.2 % below 1 */
-TEST(sharp_gradients_have_the_promised_symbol)
-{
+TEST(sharp_gradients_have_the_promised_symbol) {
     const double plain = sin(0.5) / 0.5, sharp = plain * (1 + (1 - cos(0.5)) / 3);
     CHECK_BELOW(off_symbol(0, plain), 200 * EPSILON);
     CHECK_BELOW(off_symbol(1, sharp), 200 * EPSILON);
 }
 
-TEST(sharp_gradients_conserve_energy)
-{
+TEST(sharp_gradients_conserve_energy) {
     int unknowns, projection;
     for (unknowns = TLSPH_PF; unknowns <= TLSPH_PFH; unknowns++)
         for (projection = 0; projection < 2; projection++) {
@@ -811,8 +784,7 @@ TEST(sharp_gradients_conserve_energy)
         }
 }
 
-TEST(sharp_gradients_are_refused_on_irregular_clouds)
-{
+TEST(sharp_gradients_are_refused_on_irregular_clouds) {
     static const int cells[3] = {4, 4, 4};
     tlsph_error error;
     body b;
@@ -832,8 +804,7 @@ TEST(sharp_gradients_are_refused_on_irregular_clouds)
 /* ---- relaxation of J ---- */
 
 /* Rollers on all faces of a box; `lists` holds 6 n numbers. */
-static void roller_box(body *b, uint32_t *lists, tlsph_condition conditions[6], const double size[3])
-{
+static void roller_box(body *b, uint32_t *lists, tlsph_condition conditions[6], const double size[3]) {
     const int dimension = b->desc.dimension;
     size_t n = b->cloud.particles.count;
     int axis, side;
@@ -842,8 +813,8 @@ static void roller_box(body *b, uint32_t *lists, tlsph_condition conditions[6], 
             int i = 2 * axis + side;
             conditions[i] = tlsph_condition_default(TLSPH_ROLLER);
             conditions[i].particles = lists + (size_t)i * n;
-            conditions[i].count = tlsph_select_plane(&b->cloud.particles, axis, R(side * size[axis]), R(1e-4),
-                                                     lists + (size_t)i * n, n);
+            conditions[i].count =
+                tlsph_select_plane(&b->cloud.particles, axis, R(side * size[axis]), R(1e-4), lists + (size_t)i * n, n);
             conditions[i].normal[axis] = side ? 1 : -1;
         }
     b->desc.conditions = conditions;
@@ -851,8 +822,7 @@ static void roller_box(body *b, uint32_t *lists, tlsph_condition conditions[6], 
 }
 
 /* Mean of J / det F - 1 after `time`, from J = 1.02 and F = I at rest; between rollers nothing else can happen. */
-static double drift_after(double relaxation, double time, double *c_p, double *c_s, double *tau)
-{
+static double drift_after(double relaxation, double time, double *c_p, double *c_s, double *tau) {
     static const double size[3] = {1, 1, 1};
     tlsph_condition conditions[6];
     tlsph_operator view;
@@ -889,8 +859,7 @@ static double drift_after(double relaxation, double time, double *c_p, double *c
     return mean;
 }
 
-TEST(drift_relaxation_pulls_J_to_det_F)
-{
+TEST(drift_relaxation_pulls_J_to_det_F) {
     const double time = 0.1;
     double c_p, c_s, tau, phi = 0.02, without = drift_after(0, time, &c_p, &c_s, &tau), with;
     int i;
@@ -907,17 +876,15 @@ TEST(drift_relaxation_pulls_J_to_det_F)
 
 /* ---- heat ---- */
 
-static tlsph_material heat_conductor(void)
-{
+static tlsph_material heat_conductor(void) {
     tlsph_material m = soft_material(TLSPH_LINEAR);
-    m.expansion = 0; /* nothing moves */
+    m.expansion = 0;       /* nothing moves */
     m.conductivity = 1000; /* D = 1 m^2/s */
     return m;
 }
 
 /* Bar of 2 m, 8 cells: 300 K held at X = 0, the flux at X = 2. theta along the bar in `out` (9 values). */
-static int bar_profile(double flux, double time, tlsph_conduction conduction, double out[9])
-{
+static int bar_profile(double flux, double time, tlsph_conduction conduction, double out[9]) {
     static const double size[3] = {2, 0.5, 0};
     tlsph_condition conditions[6];
     uint32_t *lists;
@@ -951,8 +918,7 @@ static int bar_profile(double flux, double time, tlsph_conduction conduction, do
 }
 
 /* Steady: theta = 300 K - q X/h. The slowest mode decays with D (pi/4)^2 = 0.617/s, so 30 s leave e^-18 of it. */
-static void check_flux(double flux, tlsph_conduction conduction)
-{
+static void check_flux(double flux, tlsph_conduction conduction) {
     double theta[9] = {0}, slope = -flux / 1000, worst = 0;
     int i;
     REQUIRE(bar_profile(flux, 30, conduction, theta));
@@ -963,18 +929,19 @@ static void check_flux(double flux, tlsph_conduction conduction)
     CHECK(flux > 0 ? theta[8] < 300 : theta[8] > 300); /* positive: heat leaves */
 }
 
-TEST(heat_flux_makes_the_linear_profile)
-{
+TEST(heat_flux_makes_the_linear_profile) {
     DOUBLE_ONLY();
     check_flux(1000, TLSPH_COMPACT);
     check_flux(-1000, TLSPH_COMPACT);
 }
 
-TEST(heat_flux_of_the_double_gradient) { DOUBLE_ONLY(); check_flux(1000, TLSPH_DOUBLE_GRADIENT); }
+TEST(heat_flux_of_the_double_gradient) {
+    DOUBLE_ONLY();
+    check_flux(1000, TLSPH_DOUBLE_GRADIENT);
+}
 
 /* Volume mean of theta. */
-static double mean_temperature(const body *b)
-{
+static double mean_temperature(const body *b) {
     tlsph_real *theta = read_field(b->solver, TLSPH_FIELD_TEMPERATURE);
     double sum = 0, volume = 0;
     size_t a;
@@ -987,8 +954,7 @@ static double mean_temperature(const body *b)
 }
 
 /* Insulated: what conduction moves inside does not matter. */
-TEST(heat_source_warms_an_insulated_body)
-{
+TEST(heat_source_warms_an_insulated_body) {
     tlsph_condition source = tlsph_condition_default(TLSPH_HEAT_SOURCE);
     double before, rise = 5e5 * 0.05 / 1e6; /* s t / c_v, c_v = rho C_v */
     body b;
@@ -1006,8 +972,7 @@ TEST(heat_source_warms_an_insulated_body)
     body_destroy(&b);
 }
 
-TEST(prescribed_temperature_holds)
-{
+TEST(prescribed_temperature_holds) {
     int thermal;
     for (thermal = TLSPH_ENERGY; thermal <= TLSPH_ENTROPY; thermal++) {
         moving_block s = moving_block_default();
@@ -1035,11 +1000,11 @@ TEST(prescribed_temperature_holds)
 SUITE(features, ENTRY(user_neo_hookean_is_the_built_in_one), ENTRY(user_mie_gruneisen_is_the_built_in_one),
       ENTRY(user_material_gets_host_numbers_in_batches), ENTRY(two_materials), ENTRY(user_and_built_in_materials_mix),
       ENTRY(given_pair_vectors_of_cells_give_the_same_motion),
-      ENTRY(given_pair_vectors_must_be_antisymmetric_and_exact), ENTRY(undamped_energy_grows_by_the_time_scheme_only), ENTRY(every_dissipation_runs),
-      ENTRY(every_set_of_unknowns_and_thermal_form_runs), ENTRY(printed_volume_coupling_and_relaxation_run),
-      ENTRY(every_kernel_and_support_runs), ENTRY(sharp_gradients_and_projection_run),
-      ENTRY(every_conduction_and_material_runs), ENTRY(linear_material_runs_with_and_without_projection),
-      ENTRY(sharp_gradients_are_exact_for_affine_fields),
+      ENTRY(given_pair_vectors_must_be_antisymmetric_and_exact), ENTRY(undamped_energy_grows_by_the_time_scheme_only),
+      ENTRY(every_dissipation_runs), ENTRY(every_set_of_unknowns_and_thermal_form_runs),
+      ENTRY(printed_volume_coupling_and_relaxation_run), ENTRY(every_kernel_and_support_runs),
+      ENTRY(sharp_gradients_and_projection_run), ENTRY(every_conduction_and_material_runs),
+      ENTRY(linear_material_runs_with_and_without_projection), ENTRY(sharp_gradients_are_exact_for_affine_fields),
       ENTRY(sharp_gradients_have_the_promised_symbol), ENTRY(sharp_gradients_conserve_energy),
       ENTRY(sharp_gradients_are_refused_on_irregular_clouds), ENTRY(drift_relaxation_pulls_J_to_det_F),
       ENTRY(heat_flux_makes_the_linear_profile), ENTRY(heat_flux_of_the_double_gradient),

@@ -22,12 +22,18 @@ static void plate_constants(plate *p) {
     p->omega = SCENE_PI / 2 * sqrt(2 * p->shear / (double)p->body.material.density);
 }
 
-static void plate_exact(const plate *p, const tlsph_real X[3], double t, double u[3], double v[3], double F[9], double P[9]) {
-    const double q = SCENE_PI / 2, U = p->amplitude * sin(p->omega * t), rate = p->amplitude * p->omega * cos(p->omega * t);
-    const double sx = sin(q * (double)X[0]), cx = cos(q * (double)X[0]), sy = sin(q * (double)X[1]), cy = cos(q * (double)X[1]);
-    const double shape[3] = { -sx * cy, cx * sy, 0 };
-    const double slope[9] = { -q * cx * cy, q * sx * sy, 0, -q * sx * sy, q * cx * cy, 0, 0, 0, 0 };
-    for (int i = 0; i < 3; i++) { u[i] = U * shape[i]; v[i] = rate * shape[i]; }
+static void plate_exact(const plate *p, const tlsph_real X[3], double t, double u[3], double v[3], double F[9],
+                        double P[9]) {
+    const double q = SCENE_PI / 2, U = p->amplitude * sin(p->omega * t),
+                 rate = p->amplitude * p->omega * cos(p->omega * t);
+    const double sx = sin(q * (double)X[0]), cx = cos(q * (double)X[0]), sy = sin(q * (double)X[1]),
+                 cy = cos(q * (double)X[1]);
+    const double shape[3] = {-sx * cy, cx * sy, 0};
+    const double slope[9] = {-q * cx * cy, q * sx * sy, 0, -q * sx * sy, q * cx * cy, 0, 0, 0, 0};
+    for (int i = 0; i < 3; i++) {
+        u[i] = U * shape[i];
+        v[i] = rate * shape[i];
+    }
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             F[3 * i + j] = (i == j) + U * slope[3 * i + j];
@@ -45,7 +51,7 @@ TEST(swinging_plate_formula_is_that_of_the_table) {
     REQUIRE(table_read(&t, REFERENCES "/swinging_plate_t0.002_nu0.3_U5e-4m.csv") == 0);
     CHECK(t.rows >= 50);
     for (size_t i = 0; i < t.rows; i++) {
-        const tlsph_real X[3] = { R(table_number(&t, i, "X")), R(table_number(&t, i, "Y")), 0 };
+        const tlsph_real X[3] = {R(table_number(&t, i, "X")), R(table_number(&t, i, "Y")), 0};
         double u[3], v[3], F[9], P[9], expected[9];
         plate_exact(&p, X, 0.002, u, v, F, P);
         CHECK_CLOSE(u[0], table_number(&t, i, "u1"), 1e1 * EPSILON * 5e-4);
@@ -94,10 +100,17 @@ static void plate_errors(const plate *p, double *error_v, double *error_P) {
     for (size_t a = 0; velocity && stress && a < tlsph_count(p->body.solver); a++) {
         double u[3], v[3], F[9], P[9];
         plate_exact(p, p->body.cloud.particles.positions + 3 * a, t, u, v, F, P);
-        for (size_t i = 0; i < 3; i++) { off_v += pow((double)velocity[3 * a + i] - v[i], 2); all_v += v[i] * v[i]; }
-        for (size_t i = 0; i < 9; i++) { off_P += pow((double)stress[9 * a + i] - P[i], 2); all_P += P[i] * P[i]; }
+        for (size_t i = 0; i < 3; i++) {
+            off_v += pow((double)velocity[3 * a + i] - v[i], 2);
+            all_v += v[i] * v[i];
+        }
+        for (size_t i = 0; i < 9; i++) {
+            off_P += pow((double)stress[9 * a + i] - P[i], 2);
+            all_P += P[i] * P[i];
+        }
     }
-    free(velocity); free(stress);
+    free(velocity);
+    free(stress);
     *error_v = all_v > 0 ? sqrt(off_v / all_v) : HUGE_VAL;
     *error_P = all_P > 0 ? sqrt(off_P / all_P) : HUGE_VAL;
 }
@@ -117,8 +130,8 @@ static int plate_run(int n, int sharp, int projection, double *error_v, double *
 static void check_order(int projection) {
     double v[3], P[3];
     for (int i = 0; i < 3; i++) REQUIRE(plate_run(8 << i, 0, projection, &v[i], &P[i]));
-    REPORT("v %.1e %.1e %.1e order %.2f, P %.1e %.1e %.1e order %.2f", v[0], v[1], v[2], observed_order(v, 3), P[0], P[1],
-           P[2], observed_order(P, 3));
+    REPORT("v %.1e %.1e %.1e order %.2f, P %.1e %.1e %.1e order %.2f", v[0], v[1], v[2], observed_order(v, 3), P[0],
+           P[1], P[2], observed_order(P, 3));
     CHECK(observed_order(v, 3) >= 1.8);
     CHECK(observed_order(P, 3) >= 1.8);
     CHECK_BELOW(v[2], 0.005); /* a wrong frequency would not converge to zero */
@@ -135,10 +148,22 @@ static void check_sharp(int projection) {
 
 /* This mode has angular momentum about the middle, which the swinging cube has not: what the projection takes for a rigid
    turn must not disturb the mirror rules at the rollers. Hence with and without projection. */
-TEST(swinging_plate_is_second_order) { DOUBLE_ONLY(); check_order(1); }
-TEST(swinging_plate_is_second_order_without_projection) { DOUBLE_ONLY(); check_order(0); }
-TEST(swinging_plate_sharp_gradients_are_sharper) { DOUBLE_ONLY(); check_sharp(1); }
-TEST(swinging_plate_sharp_gradients_are_sharper_without_projection) { DOUBLE_ONLY(); check_sharp(0); }
+TEST(swinging_plate_is_second_order) {
+    DOUBLE_ONLY();
+    check_order(1);
+}
+TEST(swinging_plate_is_second_order_without_projection) {
+    DOUBLE_ONLY();
+    check_order(0);
+}
+TEST(swinging_plate_sharp_gradients_are_sharper) {
+    DOUBLE_ONLY();
+    check_sharp(1);
+}
+TEST(swinging_plate_sharp_gradients_are_sharper_without_projection) {
+    DOUBLE_ONLY();
+    check_sharp(0);
+}
 
 SUITE(physics_plate, ENTRY(swinging_plate_formula_is_that_of_the_table), ENTRY(swinging_plate_is_second_order),
       ENTRY(swinging_plate_is_second_order_without_projection), ENTRY(swinging_plate_sharp_gradients_are_sharper),
