@@ -2510,6 +2510,7 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
                                 tlsphi_gathered *sum, tlsph_real *production) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, index[2] = {a, b};
+    const tlsph_real *velocity = s->thermal == TLSPH_ENERGY ? s->v : s->w; /* (66) has the rigid motion in it, (72) not */
     tlsph_pair_side side[2];
     tlsph_pair_flux flux;
     tlsph_real C3[3] = {0}, c3[3] = {0}, d[3] = {0};
@@ -2523,7 +2524,7 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
         side[i].density = s->wave[4 * q + 2];
         side[i].drift_ratio = s->wave[4 * q + 3];
         if (s->S) side[i].Sigma_J = s->S[q];
-        for (int k = 0; k < dim; k++) side[i].velocity[k] = s->w[D * q + (size_t)k];
+        for (int k = 0; k < dim; k++) side[i].velocity[k] = velocity[D * q + (size_t)k];
     }
     for (int k = 0; k < dim; k++) {
         C3[k] = C[k];
@@ -2533,7 +2534,8 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
                            c3, d, s->S ? s->jump_share : 0, &flux);
     for (int k = 0; k < dim; k++) sum->T[k] += flux.D_p[k];
     sum->J += flux.D_J;
-    if (s->thermal == TLSPH_ENERGY) sum->heat += flux.D_E - tlsphi_dot(3, side[0].velocity, flux.D_p);
+    /* D_p works on w in the end, because the projection takes its resultant and torque away */
+    if (s->thermal == TLSPH_ENERGY) sum->heat += flux.D_E - tlsphi_dot(dim, s->w + D * a, flux.D_p);
     *production = flux.production;
 }
 

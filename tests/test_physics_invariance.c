@@ -114,7 +114,7 @@ TEST(printed_dissipation_is_not_invariant) {
     REQUIRE_OK(run_block(&slow, &options, TLSPH_MIE_GRUNEISEN, &moved));
     compare(&still, &moved, &slow, worst);
     REPORT("v differs by %.1e m/s", worst[0]);
-    CHECK(worst[0] > 1e6 * EPSILON);
+    CHECK(worst[0] > 1e-3);
     scene_destroy(&still);
     scene_destroy(&moved);
 }
