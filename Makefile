@@ -30,9 +30,9 @@ BENCHES := $(wildcard bench/*.c)
 all: $(EXAMPLES)
 	@echo "examples are in build/ (each tells its options with --help)"
 
-# Waiting threads sleep: on a machine that does other work too, spinning ones would hold up the others.
+# Waiting threads spin for a moment only, then sleep: on a machine that does other work too, they would hold it up.
 demo: build/l_block
-	OMP_WAIT_POLICY=passive build/l_block
+	GOMP_SPINCOUNT=10000 build/l_block
 
 # ---- flavours: $(call flavour,name,flags of the library,flags of the tests) ----
 
