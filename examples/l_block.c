@@ -302,7 +302,7 @@ static void print_study(const study *s) {
     ex_check_below("velocity_difference_3_by_2", velocity[3] / velocity[2], 1);
     ex_check_below("displacement_difference_2_by_1", displacement[2] / displacement[1], 1);
     ex_check_below("displacement_difference_3_by_2", displacement[3] / displacement[2], 1);
-    ex_check("cost_exponent", cost_exponent(s), 1, 0.15); /* "linear computational cost", section 7.2 */
+    ex_result("cost_exponent", cost_exponent(s), "1"); /* "linear computational cost", section 7.2: a speed, so no check */
 }
 
 static int run_studies(driver *d, const l_block_parameters *p) {
