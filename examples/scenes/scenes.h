@@ -259,4 +259,18 @@ tlsph_result impact_create(const impact_parameters *parameters, impact *out, tls
 void impact_read(const impact *bar, double shock_speed, double from, double to, const impact_star *exact,
                  impact_star *mean, double *overshoot);
 
+/* How much of a field (say the pressure) alternates from particle to particle, as a share of how much it varies smoothly:
+       standard deviation of  f_a - (f_{a-1} + f_{a+1})/2   over all particles and lattice lines through them
+       -------------------------------------------------------------------------------------------------------
+       standard deviation of the smoothed field f_a - (mean of these differences at a)/2
+   The lines run along the axes, found in the solver's neighbour lists; where one end is missing (at the surface) the line
+   is left out. Particles without lines, as in clouds, take f_a less the linear function that fits their neighbours, unless
+   these are on one side. A linear field gives 0; a checkerboard of +-A on a smooth field of deviation S gives 2 A/S, one
+   that alternates along one axis of d only gives 2 A/(S sqrt d). Smooth curvature counts too, f'' h^2/2: it falls with
+   the square of the spacing, a checkerboard does not. On its own a number above some 0.1 or 0.2 means a picture that looks
+   spotted; compare scenes at equal spacing and time. Infinite where the smoothed field is constant and the field is not,
+   and without memory, so that checks of bounds fail. `field` must have one component; `values` one a particle, host order. */
+double scene_oscillation(const tlsph_solver *solver, tlsph_field field);
+double scene_oscillation_of(const tlsph_solver *solver, const tlsph_real *values);
+
 #endif
