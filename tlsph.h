@@ -59,9 +59,9 @@ PROMISES
   allowed; a failed creation leaves nothing behind, a failed step leaves the state of the last good step.
 
 INDEX (search for the tag)
-  [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [MATERIALS]
-  [SOLVER-DATA] [EVALUATION] [DISSIPATION] [GRADIENTS] [FLUXES] [CONDITIONS] [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS]
-  [CHECKPOINT] [VALIDATION] [CREATION] [FILL] [LICENCE]
+  [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
+  [MATERIALS] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES] [CONDITIONS] [PROJECTION]
+  [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [FILL] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -156,12 +156,16 @@ typedef enum tlsph_thermal {
     TLSPH_ENTROPY     /* entropy eta per reference volume (000-57) */
 } tlsph_thermal;
 
-typedef enum tlsph_kernel { TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC } tlsph_kernel;
+typedef enum tlsph_kernel { TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC, TLSPH_WENDLAND_C2, TLSPH_WENDLAND_C4 } tlsph_kernel;
 
 /* How volumes, pair vectors C_ab and boundary area vectors B_a are made. All later code sees only these. */
 typedef enum tlsph_operator_kind {
     TLSPH_CORRECTED_KERNEL, /* C_ab = 2 V_a w_b L_a grad W_ab (000-51, 52); any cloud; exact for linear fields */
     TLSPH_CELLS,            /* dual faces of box cells whose corners are the particles: antisymmetric, closed, exact */
+    TLSPH_ZEROTH_KERNEL,    /* 2 V_a w_b times the corrected gradient of the zeroth-order kernel (002-10 to 14) */
+    TLSPH_FIRST_KERNEL,     /* the same with the gradient of the first-order kernel (002-6 to 8, appendix A) */
+    TLSPH_ZEROTH_BOND,      /* bond-based modified gradient F^c (002-37, 39) of the zeroth-order kernel, */
+    TLSPH_BOND,             /* and of the first-order kernel. See [BONDS] for these four */
     TLSPH_GIVEN             /* the host's own pair vectors, antisymmetric: C_ab = -C_ba */
 } tlsph_operator_kind;
 
@@ -170,8 +174,23 @@ typedef enum tlsph_dissipation {
     TLSPH_RECONSTRUCTED, /* linear reconstruction, no limiter: second order, breaks the entropy inequality in places */
     TLSPH_FIRST_ORDER,   /* raw jumps: robust and very diffusive */
     TLSPH_AS_PRINTED,    /* 000 (66), (73)-(76), raw jumps of v/Xi: not Galilean invariant, singular; for comparison */
+    TLSPH_JST,           /* harmonic and biharmonic dissipation of v (002-28), `harmonic` and `biharmonic`; not of J */
     TLSPH_NO_DISSIPATION /* unstable sooner or later; for comparison */
 } tlsph_dissipation;
+
+/* Forces where C_ab != -C_ba. On antisymmetric operators both are the same. */
+typedef enum tlsph_force_form {
+    TLSPH_ADJOINT,         /* sum_b (P_a C_ab - P_b C_ba)/2: no energy is lost or won; default */
+    TLSPH_FORCE_AS_PRINTED /* (P_a + P_b)(C_ab - C_ba)/4 of the kernel's own gradient (002-22): wins energy at free
+                              faces; for comparison */
+} tlsph_force_form;
+
+/* From what the stable time step is found. */
+typedef enum tlsph_step_rule {
+    TLSPH_STEP_BY_PARTICLE,   /* tau_a over the bound of the current isentropic p speed; default */
+    TLSPH_STEP_BY_PAIR,       /* r_ab lambda_ab / c_lin: current distance, mean least stretch (002-31, 32); comparison */
+    TLSPH_STEP_BY_PAIR_LINEAR /* r_ab / c_lin (002, table 1) */
+} tlsph_step_rule;
 
 /* How J enters the energy where it is evolved. */
 typedef enum tlsph_volume_coupling {
@@ -312,6 +331,8 @@ typedef struct tlsph_desc {
     tlsph_kernel kernel;                 /* default TLSPH_QUADRATIC */
     tlsph_real support;                  /* h / spacing, default 0.6 (6 neighbours on a lattice); neighbours within 2h */
     tlsph_dissipation dissipation;       /* default TLSPH_LIMITED */
+    tlsph_real harmonic, biharmonic;     /* TLSPH_JST: eta2 and eta4 of (002-28), default 0 and 1/8 */
+    tlsph_force_form force_form;         /* default TLSPH_ADJOINT */
     tlsph_volume_coupling volume_coupling; /* default TLSPH_SPLIT */
     tlsph_real drift_stiffness;          /* b0 of the drift potential W, default 1 (METHOD: J equation) */
     tlsph_real drift_scale;              /* phi_c of W, default 0.03 */
@@ -325,6 +346,7 @@ typedef struct tlsph_desc {
     int projection;                      /* 1: angular-momentum projection (000-79 to 82); default 1 */
     tlsph_integrator integrator;         /* default TLSPH_RK2 */
     tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1] */
+    tlsph_step_rule step_rule;           /* default TLSPH_STEP_BY_PARTICLE */
     int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
     tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP, else serial */
@@ -449,7 +471,7 @@ typedef struct tlsph_cloud {
 } tlsph_cloud;
 
 /* A solver's discrete operator, read-only, in the solver's own order (see tlsph_operator_view).
-   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab, with C_ab = M_a g_ab and M_a = I where correction is NULL. */
+   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab, with C_ab = M_a g_ab + r_ab, M_a = I and r_ab = 0 where they are NULL. */
 typedef struct tlsph_operator {
     size_t count, pairs;
     int dimension;
@@ -457,6 +479,7 @@ typedef struct tlsph_operator {
     const uint32_t *neighbours;    /* b, solver's order */
     const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric */
     const tlsph_real *correction;  /* M_a, dimension^2 each, or NULL */
+    const tlsph_real *rests;       /* r_ab, `dimension` each, or NULL */
     const tlsph_real *volumes;     /* V_a */
     const tlsph_real *boundary;    /* B_a, `dimension` each */
     const tlsph_real *spacing;     /* tau_a, the length that the time step sees */
@@ -587,7 +610,8 @@ TLSPH_API void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_s
      V_a dE_a  = sum_b ((P_a C_ab).v_b - (P_b C_ba).v_a)/2 - heat + D_E                         (000-54e)
    The force is the adjoint of the gradient, so the power of the stresses is P_a : grad v_a in each particle exactly and
    nothing is lost between momentum and energy. Every builder writes C_ab = M_a g_ab with g_ab = -g_ba, so that
-   P_a C_ab - P_b C_ba = (P_a M_a + P_b M_b) g_ab needs one vector a pair; M = I where C itself is antisymmetric.
+   P_a C_ab - P_b C_ba = (P_a M_a + P_b M_b) g_ab needs one vector a pair; M = I where C itself is antisymmetric. Only
+   the operators of 002 are not of this form and store a second vector, C_ab = g_ab + r_ab with r_ab = r_ba ([BONDS]).
 
    TWO VOLUMES. A particle on a face carries half a cell of mass (V_a), but counts as a whole cell in kernel sums (w_a).
    With V_a in both places C_ab != -C_ba beside faces and the errors of the swinging cube grow 10 to 100 times.
@@ -607,7 +631,8 @@ TLSPH_API void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_s
 
    REFERENCES
      000  Ghavamian, Lee, Gil, Bonet, Heuze, Stainier, Comput. Methods Appl. Mech. Engrg. 379 (2021) 113736
-     001  Lee, Gil, Ghavamian, Bonet, Comput. Methods Appl. Mech. Engrg. 344 (2019) 209-250 */
+     001  Lee, Gil, Ghavamian, Bonet, Comput. Methods Appl. Mech. Engrg. 344 (2019) 209-250
+     002  Wiragunarsa, Zuhal, Dirgantara, Putra, Febrianto, bond-based deformation gradient (2024) */
 
 /* ==== [SHIMS] ====================================================================================================== */
 
@@ -965,11 +990,15 @@ TLSPHI_INLINE tlsph_real tlsphi_largest_bound(tlsph_real trace, tlsph_real trace
     const tlsph_real spread = trace_of_square - trace * trace / 3;
     return trace / 3 + tlsphi_sqrt(TLSPHI_R(2.0 / 3.0) * tlsphi_max(spread, 0));
 }
+static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+static double tlsphi_norm2(const double a[3]) { return tlsphi_dot3(a, a); }
 
 /* ==== [KERNELS] ====================================================================================================
    With s = r/h and support s < 2 (h: smoothing length).
    cubic B-spline:  W = w (1 - 3/2 s^2 + 3/4 s^3) for s < 1,  w/4 (2 - s)^3 beyond;  w = 1/(pi h^3), 2-D: 10/(7 pi h^2)
    quadratic:       W = w (3/16 s^2 - 3/4 s + 3/4);                                  w = 5/(4 pi h^3), 2-D: 2/(pi h^2)
+   Wendland C2:     W = w (1 - s/2)^4 (1 + 2 s);                      w = 21/(16 pi h^3), 2-D: 7/(4 pi h^2)
+   Wendland C4:     W = w (1 - s/2)^6 (1 + 3 s + 35/12 s^2);          w = 495/(256 pi h^3), 2-D: 9/(4 pi h^2)
    The quadratic one (001 section 3.2) has a gradient that never turns weaker towards r = 0. */
 
 static void tlsphi_kernel(tlsph_kernel kernel, int dimension, double r, double h, double *W, double *dW) {
@@ -981,6 +1010,14 @@ static void tlsphi_kernel(tlsph_kernel kernel, int dimension, double r, double h
         const double w = (dimension == 3 ? 1.25 : 2.0) / (pi * volume);
         *W = w * 0.1875 * t * t;
         *dW = -w * 0.375 * t / h;
+    } else if (kernel == TLSPH_WENDLAND_C2) {
+        const double w = (dimension == 3 ? 1.3125 : 1.75) / (pi * volume), u = t / 2;
+        *W = w * u * u * u * u * (1 + 2 * s);
+        *dW = -w * 5 * s * u * u * u / h;
+    } else if (kernel == TLSPH_WENDLAND_C4) {
+        const double w = (dimension == 3 ? 495.0 / 256 : 2.25) / (pi * volume), u = t / 2, u5 = u * u * u * u * u;
+        *W = w * u5 * u * (1 + 3 * s + 35.0 / 12 * s * s);
+        *dW = -w * 14.0 / 3 * s * u5 * (1 + 2.5 * s) / h;
     } else {
         const double w = (dimension == 3 ? 1.0 : 10.0 / 7.0) / (pi * volume);
         *W = s < 1 ? w * (1 - 1.5 * s * s + 0.75 * s * s * s) : w * 0.25 * t * t * t;
@@ -1087,6 +1124,7 @@ typedef struct tlsphi_plan {
     uint32_t *cell_of;
     double *volume;         /* and V_a made of them */
     double *correction;     /* kernels: M_a, dim x dim each, host order */
+    struct tlsphi_bond *bond; /* operators that need a second pair vector: coefficients, host order; else NULL */
     int antisymmetric;      /* C_ab = -C_ba to round-off: the solver stores C itself */
     uint32_t *host, *inner; /* solver order -> host number, and back */
     uint32_t *body;         /* of each particle in solver order */
@@ -1405,6 +1443,176 @@ static tlsph_result tlsphi_correct(tlsphi_plan *plan, size_t a, const double A[9
     return TLSPH_OK;
 }
 
+/* ==== [BONDS] ======================================================================================================
+   Operators of 002. Kernels that are corrected themselves (W~, 002-6), so that sum w W~ = 1 and, first order,
+   sum w (X_b - X_a) W~ = 0: with x = X_a - X_b and W of the plain kernel
+     W~_ab = alpha (1 + beta.x) W,   G_ab = w_b L (alpha (1 + beta.x) grad W + ((1 + beta.x) grad alpha
+                                                  + alpha (grad beta^T x + beta)) W),   C_ab = 2 V_a G_ab
+   Zeroth order: beta = 0, L = (sum w d (x) grad W~)^-T ((12) lacks the transpose, gamma of (13) its factor W).
+   First order: L = I. The plain gradient of 000 is alpha = 1, beta = 0. The kernel sums include the particle itself.
+
+   Bond-based gradient (37), (39): F^c = F A + sum_b (x_b - x_a)/r (x) n w_b W~_ab with n = d/r and
+   A = I - sum_b w_b W~_ab n (x) n. Since F = sum x (x) G, this is one more constant gradient:
+     G^c_ab = A G_ab + w_b W~_ab n/r
+   It needs no loop of its own, and its adjoint is the force that keeps the energy (25 as printed does not).
+
+   Storage. None of these C_ab is M_a times an antisymmetric vector. The half difference g_ab = (C_ab - C_ba)/2 takes the
+   place of the antisymmetric operator, and the half sum r_ab = (C_ab + C_ba)/2 is a second vector:
+     P_a C_ab - P_b C_ba = (P_a + P_b) g_ab + (P_a - P_b) r_ab
+   The printed force is what remains without the second part, with g_ab of the kernel's gradient and not of the bonds; r_ab
+   then is C_ab - g_ab and serves gradients only. */
+
+typedef struct tlsphi_bond {
+    double alpha, beta[3], d_alpha[3], d_beta[9]; /* d_beta[3 k + i] = d beta_i / dX_k */
+    double L[9], A[9];
+} tlsphi_bond;
+
+static int tlsphi_is_bond(tlsph_operator_kind kind) { return kind == TLSPH_BOND || kind == TLSPH_ZEROTH_BOND; }
+static int tlsphi_needs_bonds(const tlsph_desc *d) {
+    return tlsphi_is_bond(d->operator_kind) || d->operator_kind == TLSPH_ZEROTH_KERNEL ||
+           d->operator_kind == TLSPH_FIRST_KERNEL ||
+           (d->operator_kind == TLSPH_CORRECTED_KERNEL && d->force_form == TLSPH_FORCE_AS_PRINTED);
+}
+/* y = A x for padded 3x3. */
+static void tlsphi_multiply9(const double A[9], const double x[3], double y[3]) {
+    for (int i = 0; i < 3; i++) y[i] = A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
+}
+/* w_b W~_ab and w_b grad W~_ab, without L. */
+static void tlsphi_bond_kernel(const tlsphi_plan *plan, size_t a, size_t b, double *value, double slope[3]) {
+    const tlsphi_bond *c = plan->bond + a;
+    double d[3], x[3], W, dW;
+    tlsphi_difference(plan, a, b, d);
+    const double r = sqrt(tlsphi_norm2(d)), w = (double)plan->weights[b];
+    tlsphi_kernel(plan->desc->kernel, plan->dim, r, plan->h, &W, &dW);
+    for (int i = 0; i < 3; i++) x[i] = -d[i];
+    const double shape = 1 + c->beta[0] * x[0] + c->beta[1] * x[1] + c->beta[2] * x[2];
+    *value = w * c->alpha * shape * W;
+    tlsphi_multiply9(c->d_beta, x, slope);
+    for (int i = 0; i < 3; i++)
+        slope[i] = w * ((c->alpha * (slope[i] + c->beta[i]) + c->d_alpha[i] * shape) * W +
+                        (r > 0 ? c->alpha * shape * dW * x[i] / r : 0));
+}
+/* C_ab = 2 V_a G_ab, with or without the bonds. */
+static void tlsphi_bond_vector(const tlsphi_plan *plan, size_t a, size_t b, int bonds, double C[3]) {
+    double W, slope[3], G[3], d[3];
+    tlsphi_bond_kernel(plan, a, b, &W, slope);
+    tlsphi_multiply9(plan->bond[a].L, slope, G);
+    if (bonds) {
+        tlsphi_multiply9(plan->bond[a].A, G, slope);
+        tlsphi_difference(plan, a, b, d);
+        for (int i = 0; i < 3; i++) G[i] = slope[i] + W * d[i] / tlsphi_norm2(d);
+    }
+    for (int i = 0; i < 3; i++) C[i] = 2 * tlsphi_plan_volume(plan, a) * G[i];
+}
+
+/* Moments of the kernel about a particle (002-52, 55), the particle itself included; d_...[k]: derivative by X_k. */
+typedef struct tlsphi_kernel_moments {
+    double sum, first[3], second[9], d_sum[3], d_first[3][3], d_second[3][9];
+} tlsphi_kernel_moments;
+
+static void tlsphi_add_kernel_moments(const tlsphi_plan *plan, size_t a, size_t b, tlsphi_kernel_moments *m) {
+    double d[3], x[3], W, dW;
+    tlsphi_difference(plan, a, b, d);
+    const double r = sqrt(tlsphi_norm2(d)), w = (double)plan->weights[b];
+    tlsphi_kernel(plan->desc->kernel, plan->dim, r, plan->h, &W, &dW);
+    for (int i = 0; i < 3; i++) x[i] = -d[i];
+    m->sum += w * W;
+    for (int i = 0; i < 3; i++) m->first[i] += w * x[i] * W;
+    for (int i = 0; i < 9; i++) m->second[i] += w * x[i / 3] * x[i % 3] * W;
+    for (int k = 0; k < plan->dim; k++) {
+        const double slope = r > 0 ? w * dW * x[k] / r : 0;
+        m->d_sum[k] += slope;
+        for (int i = 0; i < 3; i++) m->d_first[k][i] += x[i] * slope + (i == k ? w * W : 0);
+        for (int i = 0; i < 9; i++)
+            m->d_second[k][i] += x[i / 3] * x[i % 3] * slope + w * W * ((i % 3 == k) * x[i / 3] + (i / 3 == k) * x[i % 3]);
+    }
+}
+/* alpha, beta and their derivatives (002-51, 54). */
+static void tlsphi_first_order(const tlsphi_kernel_moments *m, int dim, tlsphi_bond *c) {
+    double second[9], inverse[9] = {0}, compact[9], rhs[3];
+    memcpy(second, m->second, sizeof second);
+    if (dim == 2) second[8] = 1;
+    tlsphi_inverse(dim, second, compact);
+    for (int i = 0; i < dim * dim; i++) inverse[3 * (i / dim) + i % dim] = compact[i];
+    tlsphi_multiply9(inverse, m->first, c->beta);
+    for (int i = 0; i < 3; i++) c->beta[i] = -c->beta[i];
+    c->alpha = 1 / (m->sum + tlsphi_dot3(c->beta, m->first));
+    for (int k = 0; k < dim; k++) {
+        tlsphi_multiply9(m->d_second[k], c->beta, rhs);
+        for (int i = 0; i < 3; i++) rhs[i] = -rhs[i] - m->d_first[k][i];
+        tlsphi_multiply9(inverse, rhs, c->d_beta + 3 * k);
+        c->d_alpha[k] = -c->alpha * c->alpha *
+                        (m->d_sum[k] + tlsphi_dot3(c->d_beta + 3 * k, m->first) + tlsphi_dot3(c->beta, m->d_first[k]));
+    }
+}
+/* L, and A of the bonds; then sum_b d (x) C_ab must be 2 V_a I. */
+static tlsph_result tlsphi_bond_correct(tlsphi_plan *plan, size_t a, const uint32_t *list, size_t count) {
+    const int dim = plan->dim, plain = plan->desc->operator_kind == TLSPH_CORRECTED_KERNEL;
+    const int first = plan->desc->operator_kind == TLSPH_FIRST_KERNEL || plan->desc->operator_kind == TLSPH_BOND;
+    tlsphi_bond *c = plan->bond + a;
+    tlsphi_kernel_moments m;
+    double moment[9] = {0}, W, slope[3], d[3], inverse[9], worst = 0;
+    memset(&m, 0, sizeof m);
+    tlsphi_add_kernel_moments(plan, a, a, &m);
+    for (size_t i = 0; i < count; i++) tlsphi_add_kernel_moments(plan, a, list[i], &m);
+    c->alpha = plain ? 1 : 1 / m.sum;
+    for (int k = 0; k < dim && !plain; k++) c->d_alpha[k] = -c->alpha * c->alpha * m.d_sum[k];
+    if (first) tlsphi_first_order(&m, dim, c);
+    for (int i = 0; i < 9; i++) c->L[i] = c->A[i] = i % 4 == 0;
+    for (size_t i = 0; i < count; i++) {
+        tlsphi_bond_kernel(plan, a, list[i], &W, slope);
+        tlsphi_difference(plan, a, list[i], d);
+        for (int k = 0; k < 9; k++) {
+            moment[k] += slope[k / 3] * d[k % 3]; /* the transpose that (12) lacks */
+            c->A[k] -= W * d[k / 3] * d[k % 3] / tlsphi_norm2(d);
+        }
+    }
+    if (dim == 2) moment[8] = 1;
+    tlsphi_inverse(dim, moment, inverse);
+    for (int i = 0; i < dim * dim && !first; i++) c->L[3 * (i / dim) + i % dim] = inverse[i];
+    for (int k = 0; k < dim * dim; k++) { /* the product of both, to see whether either was singular */
+        const int row = k / dim, column = k % dim;
+        double product = 0;
+        for (int i = 0; i < dim; i++) product += c->L[3 * row + i] * moment[3 * i + column];
+        worst = tlsphi_dmax(worst, fabs(product - (row == column)));
+    }
+    return worst <= 1e-6 ? TLSPH_OK
+                         : tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "neighbours", a, (double)count, dim,
+                                            "enough, not in a plane, for a corrected kernel; or raise `support`");
+}
+/* M_a g, or g where there is no correction, in double; a is a host number. */
+static void tlsphi_apply_correction(const tlsphi_plan *plan, size_t a, const double *g, double out[3]) {
+    const size_t D = (size_t)plan->dim;
+    for (size_t i = 0; i < D; i++) {
+        out[i] = plan->correction ? 0 : g[i];
+        for (size_t k = 0; plan->correction && k < D; k++) out[i] += plan->correction[D * D * a + D * i + k] * g[k];
+    }
+}
+/* C_ab and -C_ba for the pair (a, b) with vector g of its builder, and g_ab where the force is the printed one; host
+   numbers. */
+static void tlsphi_pair_vectors(const tlsphi_plan *plan, size_t a, size_t b, const double *g, double mine[3],
+                                double other[3], double middle[3]) {
+    if (!plan->bond) {
+        tlsphi_apply_correction(plan, a, g, mine);
+        tlsphi_apply_correction(plan, b, g, other);
+    } else {
+        const int bonds = tlsphi_is_bond(plan->desc->operator_kind);
+        tlsphi_bond_vector(plan, a, b, bonds, mine);
+        tlsphi_bond_vector(plan, b, a, bonds, other);
+        for (int i = 0; i < 3; i++) other[i] = -other[i];
+        if (bonds && plan->desc->force_form == TLSPH_FORCE_AS_PRINTED) {
+            double back[3];
+            tlsphi_bond_vector(plan, a, b, 0, middle);
+            tlsphi_bond_vector(plan, b, a, 0, back);
+            for (int i = 0; i < 3; i++) middle[i] = (middle[i] - back[i]) / 2;
+            return;
+        }
+    }
+    for (int i = 0; i < 3; i++) middle[i] = (mine[i] + other[i]) / 2;
+}
+
+/* -- bodies and order -- */
+
 /* Union-find over the pairs: connected particles are one body (projection, [PROJECTION]). */
 static uint32_t tlsphi_root(uint32_t *parent, uint32_t a) {
     while (parent[a] != a) a = parent[a] = parent[parent[a]];
@@ -1423,12 +1631,13 @@ static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t 
         double A[9];
         const size_t count = tlsphi_neighbours_of(plan, a, list, g);
         tlsph_result r = tlsphi_moment(plan, a, list, g, count, A);
+        if (!r && plan->bond) r = tlsphi_bond_correct(plan, a, list, count);
         if (r) return r;
         const double V = tlsphi_plan_volume(plan, a);
         if (plan->correction) {
             r = tlsphi_correct(plan, a, A, count, plan->correction + (size_t)(plan->dim * plan->dim) * a);
             if (r) return r;
-        } else {
+        } else if (!plan->bond) {
             double worst = 0;
             for (int k = 0; k < plan->dim * plan->dim; k++) {
                 const int i = k / plan->dim, j = k % plan->dim;
@@ -1526,6 +1735,7 @@ typedef struct tlsphi_material {
     tlsph_real rho, c_v, theta_R, h;    /* kg/m^3, J/(m^3 K), K, W/(m K) */
     tlsph_real zeta, gamma, k, beta, q; /* Pa, Pa, Pa, Pa/K, 1 */
     tlsph_real mu, kappa;               /* Pa */
+    tlsph_real c_linear;                /* p speed of the undeformed body at constant temperature, m/s */
     tlsph_response_fn response;
     void *user;
 } tlsphi_material;
@@ -1546,6 +1756,7 @@ static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
     out.gamma = m->mooney_fraction * out.mu / TLSPHI_R(5.196152422706632); /* 3 sqrt 3 */
     out.zeta = (1 - m->mooney_fraction) * out.mu / 2;
     out.k = out.kappa - out.beta * out.theta_R * (1 - out.q);
+    out.c_linear = tlsphi_sqrt((out.kappa + 4 * out.mu / 3) / out.rho);
     out.response = m->response;
     out.user = m->response_user;
     return out;
@@ -1872,8 +2083,11 @@ typedef struct tlsphi_body {
 
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user;
-    int audit, projection, dissipation_heats, threads;
+    int audit, projection, dissipation_heats, threads, bonds;
     tlsph_dissipation dissipation;
+    tlsph_force_form force_form;
+    tlsph_step_rule step_rule;
+    double harmonic, biharmonic; /* eta2 h and eta4 h^3 */
     tlsph_volume_coupling coupling;
     tlsph_conduction conduction;
     tlsph_real drift_stiffness, drift_scale, jump_share, drift_relaxation, cfl;
@@ -1884,7 +2098,7 @@ struct tlsph_solver {
     /* operator */
     size_t *first;
     uint32_t *neighbour;
-    tlsph_real *g, *M;
+    tlsph_real *g, *M, *rest; /* rest: r_ab, see [BONDS] */
     tlsph_real *X, *V, *B, *tau;
     uint32_t *host, *inner;
     /* state, and the state at the beginning of the step */
@@ -1897,6 +2111,8 @@ struct tlsph_solver {
        temperature and its gradient, M^T Q/theta, h/J; w is v without the body's rigid motion, as the dissipation sees it
        (without projection w and grad_w are v and grad_v). Without sharp gradients rate_F, slope_w and P_flux are grad_v,
        grad_w and PM */
+    tlsph_real *least_stretch;            /* [PAIR-STEP] */
+    tlsph_real *laplacian, *lean, *lap_p; /* [JST]: l_ab a pair, 2 vectors and Lp_a a particle */
     tlsph_real *w, *grad_w, *slope_w, *v, *grad_v, *P_flux, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
     /* conditions */
     tlsphi_fix *fix;
@@ -1967,7 +2183,6 @@ static void tlsphi_cross3(const double a[3], const double b[3], double out[3]) {
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
-static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /* ==== [EVALUATION] =================================================================================================
    Algorithm 1 lines (8) and (9): stress, temperature, wave speeds of each particle from its state, and what neighbours
@@ -2099,7 +2314,7 @@ static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const double tau = (double)s->tau[a];
     double dt = TLSPHI_LARGEST;
-    if (pt->c_p > 0) dt = (double)s->cfl * tau / (double)pt->c_p;
+    if (pt->c_p > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE) dt = (double)s->cfl * tau / (double)pt->c_p;
     if (s->conducts && m->h > 0) {
         tlsph_real HtH[9];
         for (int i = 0; i < 3; i++)
@@ -2154,16 +2369,45 @@ static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
                 return;
             }
             tlsphi_publish(s, a, &pt);
+            if (s->least_stretch) {
+                double stretches[3];
+                tlsphi_stretches(pt.F, stretches);
+                s->least_stretch[a] = (tlsph_real)stretches[2];
+            }
             block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, a, &pt));
         }
     }
 }
+static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block); /* [PAIR-STEP] */
+
 /* Evaluates all particles; returns the first failed block or NULL. */
 static const tlsphi_block *tlsphi_evaluate(tlsph_solver *s) {
     tlsphi_run(s, tlsphi_evaluate_block);
     for (size_t i = 0; i < s->blocks; i++)
         if (s->block[i].failed != TLSPHI_NONE) return s->block + i;
+    if (s->step_rule != TLSPH_STEP_BY_PARTICLE) tlsphi_run(s, tlsphi_pair_step_block);
     return NULL;
+}
+
+/* ==== [PAIR-STEP] ==================================================================================================
+   The time step of 002 (31), (32): alpha_CFL min r_ab / c_ab over the pairs, with the current distance r_ab and
+   c_ab = c_lin / (mean of the least stretches of a and b). The reference speed knows nothing of stiffening. */
+
+static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = block->begin; a < block->end; a++)
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+            const size_t b = s->neighbour[k];
+            const double c_a = (double)tlsphi_material_of(s, a)->c_linear, c_b = (double)tlsphi_material_of(s, b)->c_linear;
+            double square = 0, stretch = 1;
+            for (size_t i = 0; i < D; i++) {
+                const double d = (double)s->now.x[D * b + i] - (double)s->now.x[D * a + i];
+                square += d * d;
+            }
+            if (s->step_rule == TLSPH_STEP_BY_PAIR) stretch = (double)(s->least_stretch[a] + s->least_stretch[b]) / 2;
+            block->time_step = tlsphi_dmin(block->time_step,
+                                           (double)s->cfl * sqrt(square) * stretch / tlsphi_dmax(c_a, c_b));
+        }
 }
 
 /* ==== [DISSIPATION] ================================================================================================
@@ -2330,6 +2574,30 @@ TLSPHI_INLINE void tlsphi_gradient_particle(const tlsph_solver *s, size_t a, con
     if (with_theta) tlsphi_store_slope(s, a, dim, gT, s->grad_theta + D * a);
 }
 
+/* The part of r_ab ([BONDS]): a gather of its own, so that other operators have no branch in theirs. */
+static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real half = 1 / (2 * s->V[a]);
+    tlsph_real G[9] = {0}, Gw[9] = {0};
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        tlsph_real r[3], Dv[3], Dw[3];
+        for (size_t i = 0; i < D; i++) {
+            r[i] = s->rest[D * k + i] * half;
+            Dv[i] = s->v[D * b + i] - s->v[D * a + i];
+            Dw[i] = s->w[D * b + i] - s->w[D * a + i];
+            if (s->grad_S) s->grad_S[D * a + i] += (s->S[b] - s->S[a]) * r[i];
+            if (s->grad_theta) s->grad_theta[D * a + i] += (s->theta[b] - s->theta[a]) * r[i];
+        }
+        tlsphi_add_outer(dim, G, Dv, r);
+        tlsphi_add_outer(dim, Gw, Dw, r);
+    }
+    if (s->rate_E) s->rate_E[a] += tlsphi_dot(dim * dim, s->PM + dd * a, Gw);
+    for (size_t i = 0; i < dd; i++) s->grad_v[dd * a + i] += G[i];
+    for (size_t i = 0; s->grad_w != s->grad_v && i < dd; i++) s->grad_w[dd * a + i] += Gw[i];
+}
+
 static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     const size_t D = (size_t)s->dim;
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
@@ -2387,6 +2655,7 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     for (size_t a = block->begin; a < block->end; a++) {
         if (s->dim == 3) tlsphi_gradient_dispatch(s, a, 3, s->projection, with_S, with_theta);
         else tlsphi_gradient_dispatch(s, a, 2, s->projection, with_S, with_theta);
+        if (s->rest) tlsphi_gradient_rest(s, a);
         if (s->mirrors) tlsphi_mirror_gradients(s, a);
         if (s->rate_J && !s->sharp) tlsphi_jacobian_rate(s, a);
         if (with_theta) tlsphi_heat_flux(s, a);
@@ -2455,6 +2724,53 @@ static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
     }
 }
 
+/* ==== [JST] ========================================================================================================
+   Dissipation of Jameson, Schmidt and Turkel (002-28): with the p speed c of the undeformed body and p = rho v
+     V_a D_a = sum_b l_ab c (eta2 h (p_b - p_a) - eta4 h^3 (Lp_b - Lp_a)),   l_ab = max(0, C_ab^skew.d/|d|^2)
+     Lp_a = sum_b L_ab (p_b - p_a),   L_ab = (l_ab - C_ab . sum_c l_ac d_ac / (2 V_a))/V_a
+   The Laplacian comes from the operator and not from second derivatives of a kernel: where C is exact for linear fields
+   sum_b l_ab |d|^2 = 2 dim V_a, so that it is right for X.X on every particle, and at support 0.6 on a lattice it is the
+   usual difference. The second term of L_ab takes away what a linear field would give beside a face (no Laplacian from the
+   neighbours there can be right for all quadratic fields: at a corner it would be 0/0). The harmonic part of each pair
+   dissipates; the biharmonic part is the square of the Laplacian inside the body and has no sign pair by pair. v is the
+   velocity without rigid motion, as in [DISSIPATION]; each side of a pair takes half of its work as heat. */
+
+static tlsph_real tlsphi_pair_laplacian(const tlsph_solver *s, size_t a, size_t b, size_t k) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim, dd = D * D;
+    tlsph_real d[3] = {0}, C[3] = {s->g[D * k], s->g[D * k + 1], 0};
+    if (dim == 3) C[2] = s->g[D * k + 2];
+    if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, s->g + D * k, C);
+    for (size_t i = 0; i < D; i++) d[i] = s->X[D * b + i] - s->X[D * a + i];
+    return tlsphi_max(tlsphi_dot(dim, C, d), 0) / tlsphi_dot(dim, d, d);
+}
+/* sum_c l_ac d_ac / (2 V_a^2), turned so that its product with g_ab is that with C_ab; r_ab goes with rest. */
+static void tlsphi_laplacian_lean(const tlsph_solver *s, size_t a, tlsph_real lean[3], tlsph_real turned[3]) {
+    const size_t D = (size_t)s->dim;
+    lean[0] = lean[1] = lean[2] = 0;
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        const tlsph_real l = s->laplacian[k] / (2 * s->V[a] * s->V[a]);
+        for (size_t i = 0; i < D; i++) lean[i] += l * (s->X[D * b + i] - s->X[D * a + i]);
+    }
+    memcpy(turned, lean, 3 * sizeof *lean);
+    if (s->M) tlsphi_multiply_transposed(s->dim, s->M + D * D * a, lean, turned);
+}
+static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = block->begin; a < block->end; a++) {
+        const tlsph_real *lean = s->lean + 2 * D * a;
+        tlsph_real sum[3] = {0, 0, 0};
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+            const size_t b = s->neighbour[k];
+            tlsph_real L = s->laplacian[k] / s->V[a] - tlsphi_dot(s->dim, lean, s->g + D * k);
+            if (s->rest) L -= tlsphi_dot(s->dim, lean + D, s->rest + D * k);
+            for (size_t i = 0; i < D; i++)
+                sum[i] += L * (s->wave[4 * b + 2] * s->w[D * b + i] - s->wave[4 * a + 2] * s->w[D * a + i]);
+        }
+        for (size_t i = 0; i < D; i++) s->lap_p[D * a + i] = sum[i];
+    }
+}
 /* ==== [FLUXES] =====================================================================================================
    One gather over the neighbours: stress, numerical dissipation and heat. The power of the stresses needs no pairs: the
    flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
@@ -2468,6 +2784,22 @@ typedef struct tlsphi_gathered {
     double least;
 } tlsphi_gathered;
 
+/* (002-28) for one pair. */
+static void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, tlsphi_gathered *sum,
+                            tlsph_real *production) {
+    const size_t D = (size_t)s->dim;
+    const tlsph_real c = (tlsphi_material_of(s, a)->c_linear + tlsphi_material_of(s, b)->c_linear) / 2;
+    const tlsph_real l = s->laplacian[k] * c, eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
+    tlsph_real D_p[3] = {0}, Dw[3] = {0};
+    for (size_t i = 0; i < D; i++) {
+        Dw[i] = s->w[D * b + i] - s->w[D * a + i];
+        D_p[i] = l * (eta2 * (s->wave[4 * b + 2] * s->w[D * b + i] - s->wave[4 * a + 2] * s->w[D * a + i]) -
+                      eta4 * (s->lap_p[D * b + i] - s->lap_p[D * a + i]));
+        sum->T[i] += D_p[i];
+    }
+    *production = tlsphi_dot(s->dim, Dw, D_p);
+    if (s->thermal == TLSPH_ENERGY) sum->heat += *production / 2;
+}
 /* Fluxes of the default forms for one pair. dim, with_J, thermal are constants after inlining. */
 TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C,
                                          const tlsph_real *c, const int dim, const int with_J, const int thermal,
@@ -2544,9 +2876,13 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
    undeformed lattice the sum is the two-point flux, under shear the mixed terms of K stay; the limiter is that of the
    dissipation, so heat of this part only flows down the pair's temperature difference. k = h/J |c|^2 / (C.d). */
 TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g, const tlsph_real *C,
-                                    const int dim, const int thermal, tlsphi_gathered *sum) {
+                                    const tlsph_real *rest, const int dim, const int thermal, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, dd = D * D;
-    const tlsph_real q_a = tlsphi_dot(dim, s->heat + D * a, g), q_b = tlsphi_dot(dim, s->heat + D * b, g);
+    tlsph_real q_a = tlsphi_dot(dim, s->heat + D * a, g), q_b = tlsphi_dot(dim, s->heat + D * b, g);
+    if (rest) {
+        q_a += tlsphi_dot(dim, s->heat + D * a, rest);
+        q_b -= tlsphi_dot(dim, s->heat + D * b, rest);
+    }
     const tlsph_real theta_a = s->theta[a], theta_b = s->theta[b];
     sum->source -= q_a * (theta_b - theta_a);
     if (thermal == TLSPH_ENERGY) sum->heat -= (q_a * theta_b + q_b * theta_a) / 2;
@@ -2590,6 +2926,14 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
         }
         tlsphi_multiply_mean(dim, s->P_flux + dd * a, s->P_flux + dd * b, g, t); /* (P_a C_ab - P_b C_ba)/2 */
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+        const tlsph_real *rest = NULL;
+        if (!plain && s->rest && s->force_form == TLSPH_ADJOINT) { /* (P_a - P_b) r_ab / 2 */
+            tlsph_real P[9];
+            rest = s->rest + D * k;
+            for (size_t i = 0; i < dd; i++) P[i] = (s->P_flux[dd * a + i] - s->P_flux[dd * b + i]) / 2;
+            tlsphi_multiply(dim, P, rest, t);
+            for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+        }
         if (plain) {
             tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
             tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, TLSPH_LIMITED, sum, &production);
@@ -2598,11 +2942,12 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
             if (s->audit) before = *sum;
             tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
             if (s->dissipation == TLSPH_AS_PRINTED) tlsphi_pair_printed(s, a, b, C, c, sum, &production);
+            else if (s->dissipation == TLSPH_JST) tlsphi_pair_jst(s, a, b, k, sum, &production);
             else tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, (int)s->dissipation, sum, &production);
             if (s->audit) sum->least = tlsphi_dmin(sum->least, tlsphi_audit(s, a, b, &before, sum, production));
         }
         sum->production += production;
-        if (thermal && s->conducts) tlsphi_pair_heat(s, a, b, g, C, dim, thermal, sum);
+        if (thermal && s->conducts) tlsphi_pair_heat(s, a, b, g, C, rest, dim, thermal, sum);
     }
 }
 
@@ -2668,7 +3013,7 @@ TLSPHI_FLUX(2, 0, 1) TLSPHI_FLUX(2, 0, 2) TLSPHI_FLUX(2, 1, 0) TLSPHI_FLUX(2, 1,
 }
 static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
     for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
-    if (s->dissipation != TLSPH_LIMITED || s->M || s->audit) {
+    if (s->dissipation != TLSPH_LIMITED || s->M || s->rest || s->audit) {
         tlsphi_flux_any(s, block);
         return;
     }
@@ -3121,6 +3466,7 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
     if (s->projection) tlsphi_find_rigid_motion(&projection);
     tlsphi_run(s, tlsphi_gradient_block);
     if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block);
+    if (s->laplacian) tlsphi_run(s, tlsphi_laplacian_block);
     tlsphi_run(s, tlsphi_flux_block);
     tlsphi_collect_sums(s, stage->rate_weight * dt);
     if (s->projection) tlsphi_project(&projection);
@@ -3574,6 +3920,7 @@ TLSPHI_DEF void tlsph_operator_view(const tlsph_solver *s, tlsph_operator *view)
     view->neighbours = s->neighbour;
     view->vectors = s->g;
     view->correction = s->M;
+    view->rests = s->rest;
     view->volumes = s->V;
     view->boundary = s->B;
     view->spacing = s->tau;
@@ -3728,9 +4075,13 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"unknowns", (double)d->unknowns, TLSPH_PF, TLSPH_PFH, "a tlsph_unknowns"},
         {"thermal", (double)d->thermal, TLSPH_ISOTHERMAL, TLSPH_ENTROPY, "a tlsph_thermal"},
         {"operator_kind", (double)d->operator_kind, TLSPH_CORRECTED_KERNEL, TLSPH_GIVEN, "a tlsph_operator_kind"},
-        {"kernel", (double)d->kernel, TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC, "a tlsph_kernel"},
+        {"kernel", (double)d->kernel, TLSPH_CUBIC_SPLINE, TLSPH_WENDLAND_C4, "a tlsph_kernel"},
         {"support", (double)d->support, 1e-3, 100, "0.001 to 100"},
         {"dissipation", (double)d->dissipation, TLSPH_LIMITED, TLSPH_NO_DISSIPATION, "a tlsph_dissipation"},
+        {"harmonic", (double)d->harmonic, 0, 100, "0 to 100"},
+        {"biharmonic", (double)d->biharmonic, 0, 100, "0 to 100"},
+        {"force_form", (double)d->force_form, TLSPH_ADJOINT, TLSPH_FORCE_AS_PRINTED, "a tlsph_force_form"},
+        {"step_rule", (double)d->step_rule, TLSPH_STEP_BY_PARTICLE, TLSPH_STEP_BY_PAIR_LINEAR, "a tlsph_step_rule"},
         {"volume_coupling", (double)d->volume_coupling, TLSPH_SPLIT, TLSPH_JOINT_AS_PRINTED, "a tlsph_volume_coupling"},
         {"drift_stiffness", (double)d->drift_stiffness, 0, 1e6, "0 to 1e6"},
         {"drift_scale", (double)d->drift_scale, 1e-6, 1e6, "1e-6 to 1e6"},
@@ -3946,14 +4297,16 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     double *g = TLSPHI_SCRATCH(plan, double, D *most);
     uint32_t *parent = TLSPHI_SCRATCH(plan, uint32_t, plan->n);
     if (!list || !g || !parent) return tlsphi_no_memory(plan, 32.0 * (double)most);
-    if (desc->operator_kind == TLSPH_CORRECTED_KERNEL &&
+    if (desc->operator_kind == TLSPH_CORRECTED_KERNEL && !tlsphi_needs_bonds(desc) &&
         !(plan->correction = TLSPHI_SCRATCH(plan, double, D *D * plan->n)))
         return tlsphi_no_memory(plan, 72.0 * (double)plan->n);
+    if (tlsphi_needs_bonds(desc) && !(plan->bond = TLSPHI_SCRATCH(plan, tlsphi_bond, plan->n)))
+        return tlsphi_no_memory(plan, (double)sizeof(tlsphi_bond) * (double)plan->n);
     for (size_t a = 0; a < plan->n; a++) parent[a] = (uint32_t)a;
     if ((r = tlsphi_survey(plan, parent, list, g))) return r;
     plan->antisymmetric = 1;
     if (plan->correction) tlsphi_test_antisymmetry(plan, list, g);
-    if (desc->sharp_gradients && !plan->antisymmetric)
+    if (desc->sharp_gradients && (!plan->antisymmetric || plan->bond))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "sharp_gradients", TLSPH_NO_PARTICLE, 1, 0,
                                 "0 where C_ab != -C_ba; use TLSPH_CELLS, or a box lattice with support 0.6");
     if ((r = tlsphi_order(plan, parent))) return r;
@@ -3981,6 +4334,11 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->jump_share = d->volume_coupling == TLSPH_SPLIT ? d->jump_share : 1;
     s->drift_relaxation = d->drift_relaxation;
     s->cfl = d->cfl;
+    s->bonds = plan->bond != NULL;
+    s->force_form = d->force_form;
+    s->step_rule = d->step_rule;
+    s->harmonic = (double)d->harmonic * plan->h;
+    s->biharmonic = (double)d->biharmonic * plan->h * plan->h * plan->h;
     s->n = plan->n;
     s->pairs = plan->pairs;
     s->blocks = plan->blocks;
@@ -4039,6 +4397,11 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->P_flux = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->PM;
     s->grad_w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->grad_v;
     s->slope_w = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->grad_w;
+    if (s->step_rule == TLSPH_STEP_BY_PAIR) s->least_stretch = TLSPHI_TAKE(arena, tlsph_real, n);
+    if (s->dissipation == TLSPH_JST) {
+        s->lean = TLSPHI_TAKE(arena, tlsph_real, 2 * D * n);
+        s->lap_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    }
     if (s->has_J) {
         s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
         s->S = TLSPHI_TAKE(arena, tlsph_real, n);
@@ -4100,9 +4463,12 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     const size_t before_pairs = arena->used;
     s->first = TLSPHI_TAKE(arena, size_t, n + 1);
     s->size.bytes_per_particle = (before_pairs + (n + 1) * sizeof(size_t)) / n;
-    s->size.bytes_per_pair = sizeof(uint32_t) + D * sizeof(tlsph_real);
+    s->size.bytes_per_pair = sizeof(uint32_t) + ((s->bonds ? 2 : 1) * D + (s->dissipation == TLSPH_JST)) *
+                                                    sizeof(tlsph_real);
     s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
     s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
+    if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
+    if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
     s->size.bytes = arena->used + 63;
     s->size.pairs = s->pairs;
     s->size.neighbours_least = plan->least;
@@ -4145,14 +4511,6 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
             s->M[D * D * a + i] = (tlsph_real)plan->correction[D * D * plan->host[a] + i];
 }
 
-/* M_a g, or g where there is no correction, in double; a is a host number. */
-static void tlsphi_apply_correction(const tlsphi_plan *plan, size_t a, const double *g, double out[3]) {
-    const size_t D = (size_t)plan->dim;
-    for (size_t i = 0; i < D; i++) {
-        out[i] = plan->correction ? 0 : g[i];
-        for (size_t k = 0; plan->correction && k < D; k++) out[i] += plan->correction[D * D * a + D * i + k] * g[k];
-    }
-}
 /* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
 static void tlsphi_sort_pairs(int dim, uint32_t *list, double *g, size_t count) {
     for (size_t i = 1; i < count; i++) {
@@ -4180,12 +4538,12 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
         tlsphi_sort_pairs(s->dim, list, g, count);
         for (size_t i = 0; i < count; i++) {
-            double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, square = 0;
-            tlsphi_apply_correction(plan, h, g + D * i, mine);
-            tlsphi_apply_correction(plan, plan->host[list[i]], g + D * i, other);
+            double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, middle[3], square = 0;
+            tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, middle);
             s->neighbour[start + i] = list[i];
             for (size_t k = 0; k < D; k++) {
-                const double C = (mine[k] + other[k]) / 2;
+                const double C = middle[k];
+                if (s->rest) s->rest[D * (start + i) + k] = (tlsph_real)(mine[k] - C);
                 s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
                 B[k] -= C;
                 square += mine[k] * mine[k];
@@ -4195,6 +4553,20 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
         s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum /
                                  (s->sharp ? TLSPHI_SHARP_STEP : 1));
+    }
+}
+static void tlsphi_fill_laplacian(tlsph_solver *s) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = 0; s->laplacian && a < s->n; a++)
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++)
+            s->laplacian[k] = tlsphi_pair_laplacian(s, a, s->neighbour[k], k);
+    for (size_t a = 0; s->laplacian && a < s->n; a++) {
+        tlsph_real lean[3], turned[3];
+        tlsphi_laplacian_lean(s, a, lean, turned);
+        for (size_t i = 0; i < D; i++) {
+            s->lean[2 * D * a + i] = turned[i];
+            s->lean[2 * D * a + D + i] = lean[i];
+        }
     }
 }
 static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
@@ -4329,6 +4701,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     TLSPH_ASSERT(s->block[s->blocks - 1].end == s->n);
     tlsphi_fill_particles(s, plan);
     tlsphi_fill_pairs(s, plan, list, g);
+    tlsphi_fill_laplacian(s);
     tlsphi_fill_fixes(s, plan);
     tlsphi_fill_mirrors(s, plan);
     tlsphi_fill_turns(s);
@@ -4435,6 +4808,7 @@ TLSPHI_DEF tlsph_desc tlsph_desc_default(int dimension) {
     d.dimension = dimension;
     d.kernel = TLSPH_QUADRATIC;
     d.support = TLSPHI_R(0.6);
+    d.biharmonic = TLSPHI_R(0.125);
     d.drift_stiffness = 1;
     d.drift_scale = TLSPHI_R(0.03);
     d.jump_share = TLSPHI_R(0.5);

@@ -1,7 +1,8 @@
 /* Smoothing kernels: normalised, compact, monotone, with the right derivative. */
 #include "support.h"
 
-static const tlsph_kernel kernels[2] = {TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC};
+enum { KERNELS = 4 };
+static const tlsph_kernel kernels[KERNELS] = {TLSPH_CUBIC_SPLINE, TLSPH_QUADRATIC, TLSPH_WENDLAND_C2, TLSPH_WENDLAND_C4};
 
 /* 5-point Gauss-Legendre on [-1, 1]: exact to degree 9, so for a cubic times r^2. */
 static const double gauss_x[5] = {-0.906179845938663992797627, -0.538469310105683091036314, 0,
@@ -23,16 +24,17 @@ static double kernel_slope(tlsph_kernel kernel, int dimension, double r, double 
     return (double)dW;
 }
 
-/* Integral of W over the disk or ball of radius 2h; the kernels are polynomials on [0, h] and [h, 2h]. */
+/* Integral of W over the disk or ball of radius 2h; the kernels are polynomials on [0, h] and [h, 2h], of degree 8 at most
+   (10 with r^2), so that each half is cut in four. */
 static double integral(tlsph_kernel kernel, int dimension, double h)
 {
     double sum = 0;
     int piece, k;
-    for (piece = 0; piece < 2; piece++)
+    for (piece = 0; piece < 8; piece++)
         for (k = 0; k < 5; k++) {
-            double r = h * (piece + 0.5 + 0.5 * gauss_x[k]);
+            double r = h * (piece + 0.5 + 0.5 * gauss_x[k]) / 4;
             double shell = dimension == 2 ? 2 * PI * r : 4 * PI * r * r;
-            sum += 0.5 * h * gauss_w[k] * shell * kernel_value(kernel, dimension, r, h);
+            sum += 0.125 * h * gauss_w[k] * shell * kernel_value(kernel, dimension, r, h);
         }
     return sum;
 }
@@ -40,7 +42,7 @@ static double integral(tlsph_kernel kernel, int dimension, double h)
 TEST(normalised)
 {
     int i, dimension;
-    for (i = 0; i < 2; i++)
+    for (i = 0; i < KERNELS; i++)
         for (dimension = 2; dimension <= 3; dimension++) {
             CHECK_CLOSE(integral(kernels[i], dimension, 1), 1, ROUNDED(1e-10, 50));
             CHECK_CLOSE(integral(kernels[i], dimension, 0.037), 1, ROUNDED(1e-10, 50));
@@ -51,7 +53,7 @@ TEST(compact_support)
 {
     int i, dimension;
     double h = 0.5;
-    for (i = 0; i < 2; i++)
+    for (i = 0; i < KERNELS; i++)
         for (dimension = 2; dimension <= 3; dimension++) {
             double centre = kernel_value(kernels[i], dimension, 0, h), r;
             CHECK(kernel_value(kernels[i], dimension, 1.9 * h, h) > 0);
@@ -69,7 +71,7 @@ TEST(slope_is_the_derivative)
 {
     int i, dimension;
     double h = 0.7, step = h * cbrt(EPSILON), r;
-    for (i = 0; i < 2; i++)
+    for (i = 0; i < KERNELS; i++)
         for (dimension = 2; dimension <= 3; dimension++) {
             double scale = kernel_value(kernels[i], dimension, 0, h) / h;
             for (r = 0.05 * h; r < 1.95 * h; r += 0.0637 * h) {
@@ -86,7 +88,7 @@ TEST(monotone)
 {
     int i, dimension;
     double h = 1, r;
-    for (i = 0; i < 2; i++)
+    for (i = 0; i < KERNELS; i++)
         for (dimension = 2; dimension <= 3; dimension++)
             for (r = 0.01; r < 2; r += 0.01) {
                 CHECK(kernel_value(kernels[i], dimension, r, h) < kernel_value(kernels[i], dimension, r - 0.01, h));
@@ -98,7 +100,7 @@ TEST(monotone)
 TEST(scales_with_h)
 {
     int i, dimension;
-    for (i = 0; i < 2; i++)
+    for (i = 0; i < KERNELS; i++)
         for (dimension = 2; dimension <= 3; dimension++) {
             double one = kernel_value(kernels[i], dimension, 0.75, 1), small = kernel_value(kernels[i], dimension, 0.1875, 0.25);
             CHECK_CLOSE(small, one * pow(4, dimension), 30 * EPSILON * small);

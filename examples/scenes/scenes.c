@@ -17,6 +17,10 @@ void scene_options_default(scene_options *options) {
     options->operator_kind = (int)desc.operator_kind;
     options->kernel = (int)desc.kernel;
     options->dissipation = (int)desc.dissipation;
+    options->harmonic = (double)desc.harmonic;
+    options->biharmonic = (double)desc.biharmonic;
+    options->force_form = (int)desc.force_form;
+    options->step_rule = (int)desc.step_rule;
     options->volume_coupling = (int)desc.volume_coupling;
     options->conduction = (int)desc.conduction;
     options->integrator = (int)desc.integrator;
@@ -49,10 +53,15 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = real("cfl", &o->cfl, "", 1e-6, 1, "Courant number (000-78)");
     table[i++] = choice("unknowns", &o->unknowns, "pF|pFJ|pFHJ|pFH", "deformation measures that are evolved");
     table[i++] = choice("thermal", &o->thermal, "isothermal|energy|entropy", "thermal unknown that is evolved");
-    table[i++] = choice("operator", &o->operator_kind, "corrected|cells", "corrected kernel, or dual faces of cells");
-    table[i++] = choice("kernel", &o->kernel, "cubic|quadratic", "of the corrected-kernel operator");
+    table[i++] = choice("operator", &o->operator_kind, "corrected|cells|W0|W1|bond0|bond",
+                        "corrected kernel, dual faces of cells; 002: kernels of order 0 and 1, with bonds");
+    table[i++] = choice("kernel", &o->kernel, "cubic|quadratic|wendland2|wendland4", "of the operators with kernels");
     table[i++] = real("support", &o->support, "spacings", 0.5, 4, "smoothing length h; neighbours within 2h");
-    table[i++] = choice("dissipation", &o->dissipation, "limited|reconstructed|first|printed|none", "upwinding");
+    table[i++] = choice("dissipation", &o->dissipation, "limited|reconstructed|first|printed|jst|none", "upwinding");
+    table[i++] = real("harmonic", &o->harmonic, "", 0, 100, "eta2 of the dissipation jst (002-28)");
+    table[i++] = real("biharmonic", &o->biharmonic, "", 0, 100, "eta4 of the dissipation jst (002-28)");
+    table[i++] = choice("force", &o->force_form, "adjoint|printed", "forces of W0, W1, bonds (printed: 002-22)");
+    table[i++] = choice("step-rule", &o->step_rule, "particle|pair|pair-linear", "time step (pair: 002-31, 32)");
     table[i++] = choice("volume", &o->volume_coupling, "split|printed", "how an evolved J enters the energy");
     table[i++] = choice("conduction", &o->conduction, "compact|double", "heat conduction's stencil");
     table[i++] = choice("integrator", &o->integrator, "rk2", "time integrator");
@@ -71,6 +80,10 @@ void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->kernel = (tlsph_kernel)options->kernel;
     desc->support = (tlsph_real)options->support;
     desc->dissipation = (tlsph_dissipation)options->dissipation;
+    desc->harmonic = (tlsph_real)options->harmonic;
+    desc->biharmonic = (tlsph_real)options->biharmonic;
+    desc->force_form = (tlsph_force_form)options->force_form;
+    desc->step_rule = (tlsph_step_rule)options->step_rule;
     desc->volume_coupling = (tlsph_volume_coupling)options->volume_coupling;
     desc->conduction = (tlsph_conduction)options->conduction;
     desc->integrator = (tlsph_integrator)options->integrator;

@@ -23,14 +23,15 @@ Nothing here prints or writes files; driver.h does that for the examples.
 /* What every scene lets one choose. Integers are those of the enumerations in tlsph.h. */
 typedef struct scene_options {
     double end_time;             /* s */
-    double cfl, support;
+    double cfl, support, harmonic, biharmonic;
     int unknowns, thermal, operator_kind, kernel, dissipation, volume_coupling, conduction, integrator;
+    int force_form, step_rule;
     int sharp, projection, audit, threads;
     int frames, quiet;           /* used by drivers only */
     const char *output;
 } scene_options;
 
-#define SCENE_OPTION_COUNT 17
+#define SCENE_OPTION_COUNT 21
 
 /* The library's own defaults, no end time, one frame. */
 void scene_options_default(scene_options *options);
