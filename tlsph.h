@@ -203,8 +203,14 @@ typedef enum tlsph_conduction {
     TLSPH_DOUBLE_GRADIENT /* 000 (56): keeps odd-even temperatures for ever */
 } tlsph_conduction;
 
+/* Time schemes. All conserve linear and angular momentum and (E form) energy to round-off. The stable CFL numbers are
+   tlsph_cfl_limit's. "Frozen": the dissipation, two thirds of an evaluation, is evaluated once a step. Smooth waves gain
+   an order or two, the dissipation itself is first order in the step; see [STEP] for what is given up. */
 typedef enum tlsph_integrator {
-    TLSPH_RK2 /* two-stage total-variation-diminishing Runge-Kutta (000-77) */
+    TLSPH_RK2,        /* two-stage total-variation-diminishing Runge-Kutta (000-77); amplifies waves by (w dt)^4/8 a step */
+    TLSPH_SSP_RK3,    /* three-stage strong-stability-preserving scheme of Shu and Osher (002-30, right stage times) */
+    TLSPH_RK3_FROZEN, /* u0 + c dt (L(u) + D(u0)), c = 1/3, 1/2, 1: third order for linear problems */
+    TLSPH_RK4_FROZEN  /* c = 1/4, 1/3, 1/2, 1: fourth order for linear problems */
 } tlsph_integrator;
 
 typedef enum tlsph_material_kind {
@@ -345,7 +351,7 @@ typedef struct tlsph_desc {
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
     int projection;                      /* 1: angular-momentum projection (000-79 to 82); default 1 */
     tlsph_integrator integrator;         /* default TLSPH_RK2 */
-    tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1] */
+    tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1], see tlsph_cfl_limit */
     tlsph_step_rule step_rule;           /* default TLSPH_STEP_BY_PARTICLE */
     int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
@@ -539,6 +545,8 @@ TLSPH_API tlsph_real tlsph_time(const tlsph_solver *solver);               /* s 
 TLSPH_API uint64_t tlsph_step_count(const tlsph_solver *solver);
 TLSPH_API tlsph_real tlsph_stable_time_step(const tlsph_solver *solver);   /* s, for the current state */
 TLSPH_API const tlsph_error *tlsph_last_error(const tlsph_solver *solver);
+/* Largest CFL number at which a scheme was stable in all tests, 0 for no such scheme; `cfl` may be set higher, up to 1. */
+TLSPH_API tlsph_real tlsph_cfl_limit(tlsph_integrator integrator);
 
 /* -- read and set -- */
 TLSPH_API size_t tlsph_count(const tlsph_solver *solver);
@@ -2079,11 +2087,14 @@ typedef struct tlsphi_body {
     double axis[3];
     double v_mean[3], spin[3];            /* rigid motion nearest to v */
     double lambda[3], linear[3];          /* multipliers of the projection */
+    double debt[3];                       /* torque that earlier stages owe to the step, see [PROJECTION] */
 } tlsphi_body;
 
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user;
     int audit, projection, dissipation_heats, threads, bonds;
+    int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
+    tlsph_integrator integrator;
     tlsph_dissipation dissipation;
     tlsph_force_form force_form;
     tlsph_step_rule step_rule;
@@ -2114,6 +2125,7 @@ struct tlsph_solver {
     tlsph_real *least_stretch;            /* [PAIR-STEP] */
     tlsph_real *laplacian, *lean, *lap_p; /* [JST]: l_ab a pair, 2 vectors and Lp_a a particle */
     tlsph_real *w, *grad_w, *slope_w, *v, *grad_v, *P_flux, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
+    tlsph_real *held; /* frozen dissipation: T, D_J and the share of heat of each particle, D + 2; else NULL */
     /* conditions */
     tlsphi_fix *fix;
     tlsphi_mirror *mirror;
@@ -2651,10 +2663,11 @@ TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, con
     }
 }
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
-    const int with_S = s->grad_S != NULL, with_theta = s->grad_theta != NULL;
+    const int with_S = s->grad_S && s->damps, with_theta = s->grad_theta != NULL;
+    const int with_w = s->projection && (s->damps || s->rate_E); /* w and Sigma_J are there for the dissipation and E */
     for (size_t a = block->begin; a < block->end; a++) {
-        if (s->dim == 3) tlsphi_gradient_dispatch(s, a, 3, s->projection, with_S, with_theta);
-        else tlsphi_gradient_dispatch(s, a, 2, s->projection, with_S, with_theta);
+        if (s->dim == 3) tlsphi_gradient_dispatch(s, a, 3, with_w, with_S, with_theta);
+        else tlsphi_gradient_dispatch(s, a, 2, with_w, with_S, with_theta);
         if (s->rest) tlsphi_gradient_rest(s, a);
         if (s->mirrors) tlsphi_mirror_gradients(s, a);
         if (s->rate_J && !s->sharp) tlsphi_jacobian_rate(s, a);
@@ -2704,7 +2717,7 @@ TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int 
     const tlsph_real sixth = 1 / (6 * s->V[a]), reach = sixth * TLSPHI_R(TLSPHI_SHARP_REACH);
     tlsph_real correction[9] = {0}, moment[9] = {0}, relative[9] = {0};
     tlsphi_sharp_sums(s, a, dim, s->grad_v, correction, moment);
-    if (s->projection) tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL);
+    if (s->projection && (s->damps || s->rate_E)) tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL);
     else memcpy(relative, correction, sizeof relative);
     tlsphi_mirror_all(s, a, correction);
     tlsphi_mirror_all(s, a, relative);
@@ -2913,8 +2926,10 @@ static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsp
     return size > 0 ? (double)production / size : 0;
 }
 
+/* parts: a constant, TLSPHI_STRESSES (and heat) or TLSPHI_DAMPING or both; parted only where the dissipation is frozen. */
+enum { TLSPHI_STRESSES = 1, TLSPHI_DAMPING = 2, TLSPHI_BOTH = 3 };
 TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int dim, const int with_J,
-                                     const int thermal, const int plain, tlsphi_gathered *sum) {
+                                     const int thermal, const int plain, const int parts, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, dd = D * D;
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
@@ -2924,16 +2939,20 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
             tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
             C = skew;
         }
-        tlsphi_multiply_mean(dim, s->P_flux + dd * a, s->P_flux + dd * b, g, t); /* (P_a C_ab - P_b C_ba)/2 */
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += t[i];
         const tlsph_real *rest = NULL;
-        if (!plain && s->rest && s->force_form == TLSPH_ADJOINT) { /* (P_a - P_b) r_ab / 2 */
-            tlsph_real P[9];
-            rest = s->rest + D * k;
-            for (size_t i = 0; i < dd; i++) P[i] = (s->P_flux[dd * a + i] - s->P_flux[dd * b + i]) / 2;
-            tlsphi_multiply(dim, P, rest, t);
-            for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+        if (!plain && s->rest && s->force_form == TLSPH_ADJOINT) rest = s->rest + D * k;
+        if (parts & TLSPHI_STRESSES) {
+            tlsphi_multiply_mean(dim, s->P_flux + dd * a, s->P_flux + dd * b, g, t); /* (P_a C_ab - P_b C_ba)/2 */
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+            if (rest) { /* (P_a - P_b) r_ab / 2 */
+                tlsph_real P[9];
+                for (size_t i = 0; i < dd; i++) P[i] = (s->P_flux[dd * a + i] - s->P_flux[dd * b + i]) / 2;
+                tlsphi_multiply(dim, P, rest, t);
+                for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+            }
+            if (thermal && s->conducts) tlsphi_pair_heat(s, a, b, g, C, rest, dim, thermal, sum);
         }
+        if (!(parts & TLSPHI_DAMPING)) continue;
         if (plain) {
             tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
             tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, TLSPH_LIMITED, sum, &production);
@@ -2947,8 +2966,25 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
             if (s->audit) sum->least = tlsphi_dmin(sum->least, tlsphi_audit(s, a, b, &before, sum, production));
         }
         sum->production += production;
-        if (thermal && s->conducts) tlsphi_pair_heat(s, a, b, g, C, rest, dim, thermal, sum);
     }
+}
+
+/* Frozen dissipation (see [STEP]): evaluates and keeps it in the first stage, adds it in all. */
+TLSPHI_INLINE void tlsphi_keep_damping(const tlsph_solver *s, size_t a, const int dim, const tlsphi_gathered *damping) {
+    tlsph_real *held = s->held + (size_t)(dim + 2) * a;
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) held[i] = damping->T[i];
+    held[dim] = damping->J;
+    held[dim + 1] = tlsphi_dot(dim, s->w + (size_t)dim * a, damping->T) +
+                    (s->thermal == TLSPH_ENERGY ? damping->heat : damping->production / 2);
+    if (s->S && s->thermal != TLSPH_ENERGY) held[dim + 1] += s->S[a] * damping->J;
+}
+TLSPHI_INLINE void tlsphi_add_damping(const tlsph_solver *s, size_t a, const int dim, tlsphi_gathered *sum) {
+    const tlsph_real *held = s->held + (size_t)(dim + 2) * a;
+    const tlsph_real heat = held[dim + 1] - tlsphi_dot(dim, s->w + (size_t)dim * a, held); /* share + Sigma_J D_J */
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += held[i];
+    sum->J += held[dim];
+    sum->production += 2 * (heat - (s->S ? s->S[a] * held[dim] : 0));
+    if (s->thermal == TLSPH_ENERGY) sum->heat += heat;
 }
 
 /* Relaxation of J towards det F, -r c_p/tau phi, r = min(1, r0 (c_s/c_p)^2 (1 + (ln(J/d)/0.05)^2)): slower the closer nu
@@ -2993,7 +3029,20 @@ TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const
         tlsphi_gathered sum;
         memset(&sum, 0, sizeof sum);
         sum.least = TLSPHI_LARGEST;
-        tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, &sum);
+        if (!s->frozen) {
+            tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_BOTH, &sum);
+        } else {
+            tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_STRESSES, &sum);
+            if (s->damps) {
+                tlsphi_gathered damping;
+                memset(&damping, 0, sizeof damping);
+                damping.least = TLSPHI_LARGEST;
+                tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_DAMPING, &damping);
+                sum.least = damping.least;
+                tlsphi_keep_damping(s, a, dim, &damping);
+            }
+            tlsphi_add_damping(s, a, dim, &sum);
+        }
         tlsphi_flux_store(s, a, &sum, block->sums);
     }
 }
@@ -3060,11 +3109,14 @@ static int tlsphi_is_thermal(tlsph_condition_kind kind) {
     return kind == TLSPH_TEMPERATURE || kind == TLSPH_HEAT_FLUX || kind == TLSPH_HEAT_SOURCE;
 }
 
-/* One stage of the Runge-Kutta scheme: u = a u_old + b (u + dt L(u)); its rates and its corrections after the stage
-   enter the result of the step with these weights. */
+/* One stage of a Runge-Kutta scheme: u = a u_old + b u + c dt L(u), with loads at time `start`, constraints at `end`; its
+   rates and its corrections after the stage enter the result of the step with these weights. Angular momentum changes by
+   dt sum over stages of z x force, z = z_old x_old + z_next x_next + dt (z_was v_old + z_is v), see [PROJECTION].
+   ahead: the projection takes torques about x_next, which the last stage knows beforehand. */
 typedef struct tlsphi_stage {
-    double a, b, start, end, rate_weight, after_weight;
-    int last;
+    double a, b, c, start, end, rate_weight, after_weight;
+    double z_old, z_next, z_was, z_is;
+    int ahead;
 } tlsphi_stage;
 
 /* Values of a load for this time: constant, or from the host's callback. */
@@ -3082,17 +3134,30 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
     load->given.values(load->given.values_user, (tlsph_real)time, count, load->host, load->X, load->x, load->values);
 }
 
-/* Where forces of this stage act, so that the angular balance of the step closes (see [PROJECTION]). Linear elasticity
+/* Where the projection of this stage sees a particle, and (next) where the stage takes it. Linear elasticity
    takes moments about the reference positions: there P is symmetric, not P F^T, and X x p is what is conserved. */
+static double tlsphi_next_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t at) {
+    const double was = (double)s->old.x[at];
+    return was + stage->b * ((double)s->now.x[at] - was) + stage->c * dt * (double)s->v[at];
+}
 static void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double X[3]) {
     const size_t D = (size_t)s->dim;
     X[2] = 0;
-    for (size_t i = 0; i < D; i++) {
-        const double x = (double)s->now.x[D * a + i], was = (double)s->old.x[D * a + i];
-        X[i] = x;
-        if (stage->last) X[i] = stage->a * was + stage->b * (x + dt * (double)s->v[D * a + i]);
-        if (s->linear) X[i] = (double)s->X[D * a + i];
-    }
+    for (size_t i = 0; i < D; i++)
+        X[i] = s->linear      ? (double)s->X[D * a + i]
+               : stage->ahead ? tlsphi_next_position(s, stage, dt, D * a + i)
+                              : (double)s->now.x[D * a + i];
+}
+/* The arm z with which a force of this stage changes the angular momentum of the step. */
+static void tlsphi_stage_arm(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double z[3]) {
+    const size_t D = (size_t)s->dim;
+    const double rho = (double)tlsphi_material_of(s, a)->rho;
+    z[2] = 0;
+    for (size_t i = 0, at = D * a; i < D; i++, at++)
+        z[i] = s->linear ? stage->rate_weight * (double)s->X[at]
+                         : stage->z_old * (double)s->old.x[at] +
+                               stage->z_next * tlsphi_next_position(s, stage, dt, at) +
+                               dt * (stage->z_was * (double)s->old.p[at] / rho + stage->z_is * (double)s->v[at]);
 }
 
 /* The force of a load on its i-th particle, N. */
@@ -3122,16 +3187,16 @@ static void tlsphi_apply_force(tlsph_solver *s, const tlsphi_load *load, const t
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
         tlsph_real force[3] = {0, 0, 0};
-        double X[3];
+        double z[3];
         tlsphi_load_force(s, load, i, force);
-        tlsphi_stage_position(s, stage, dt, a, X);
+        tlsphi_stage_arm(s, stage, dt, a, z);
         const tlsph_real power = tlsphi_dot(s->dim, force, s->v + D * a);
         for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += force[k] / s->V[a];
         account->external_work += share * (double)power;
         for (int k = 0; k < 3; k++) {
             const int l = (k + 1) % 3, m = (k + 2) % 3;
             account->impulse[k] += share * (double)force[k];
-            account->angular_impulse[k] += share * (X[l] * (double)force[m] - X[m] * (double)force[l]);
+            account->angular_impulse[k] += dt * (z[l] * (double)force[m] - z[m] * (double)force[l]);
         }
     }
 }
@@ -3209,7 +3274,7 @@ static void tlsphi_apply_fixes(tlsph_solver *s) {
 }
 
 /* A particle at or behind the wall may not move further into it. What it loses is the kinetic energy that the stage
-   holds for its approach, a KE_old + b (KE + dt v.dp/dt), not that of the momentum which was just taken away: while it
+   holds for its approach, a KE_old + b KE + c dt v.dp/dt, not that of the momentum which was just taken away: while it
    rests at the wall, the reaction does no work. In thermal scenes the loss stays in E as heat. */
 static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
     const size_t D = (size_t)s->dim;
@@ -3225,7 +3290,7 @@ static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, const tl
         const double was = (double)tlsphi_dot(s->dim, s->old.p + D * a, N) / rho,
                      is = (double)tlsphi_dot(s->dim, s->v + D * a, N);
         const double rate = (double)tlsphi_dot(s->dim, s->rate_p + D * a, N);
-        const double held = stage->a * rho * was * was / 2 + stage->b * (rho * is * is / 2 + dt * is * rate);
+        const double held = rho / 2 * (stage->a * was * was + stage->b * is * is) + stage->c * dt * is * rate;
         s->account.contact_loss += stage->after_weight * held * (double)s->V[a];
     }
 }
@@ -3276,6 +3341,13 @@ static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt)
    the energy is conserved and no entropy is destroyed. For the same reason the stresses heat by P : grad w; it differs
    from P : dF/dt only because the last stage takes torques about x^{n+1}, by O(dt^2). Works with constraints, which take
    their part of T^ as reaction, and body by body.
+
+   Other schemes. Let stage k move x by v_k and p by f_k. Inserting one into the other, the angular momentum of a step
+   changes by dt sum_k z_k x f_k exactly, where the arms z_k hold only what stage k knows: for (002-30) (x_0 - dt v_0)/6,
+   (x_0 + dt (v_1 - v_0)/6)/6 and 2/3 x_next; for frozen schemes -dt v_0/2 in the last stage but one and x_next in the last.
+   To take torques about these would spoil a stage, whose own place is x_k. So each stage is projected about x_k, its
+   z_k x T is booked as a debt, and the last stage settles all of it by a turn about x_next, O(dt^3), whose work v.T stays
+   out of E (tlsphi_settle). In the two-stage scheme z_0 = x_0/2 and z_1 = x_next/2: no debts.
 
    Mirror planes. The rules of the mirror (see [GRADIENTS]) hold for w only if they hold for the rigid motion. So spin and
    lambda are restricted to what the planes of a body allow: a roller plane turns about its normal, planes of two
@@ -3386,6 +3458,16 @@ static void tlsphi_multipliers(tlsphi_body *body, const double *m) {
     }
     tlsphi_turn(body, torque, body->lambda);
 }
+static void tlsphi_add_debt(tlsphi_body *body, const double *m) {
+    for (int i = 0; i < 3; i++) body->debt[i] += m[i];
+}
+static void tlsphi_pay_debt(tlsphi_body *body, const double *m) {
+    double left[TLSPHI_MOMENTS];
+    memcpy(left, m, sizeof left);
+    for (int i = 0; i < 3; i++) left[3 + i] += body->debt[i];
+    tlsphi_multipliers(body, left);
+    memset(body->debt, 0, sizeof body->debt);
+}
 /* w = v - rigid motion. */
 static void tlsphi_relative_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
@@ -3416,6 +3498,40 @@ static void tlsphi_correct_task(void *arg, size_t i) {
         for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += (tlsph_real)(turn[k] + body->linear[k]);
     }
 }
+/* Sums of z x T over a block. */
+static void tlsphi_debt_task(void *arg, size_t i) {
+    const tlsphi_projection *p = (const tlsphi_projection *)arg;
+    const tlsph_solver *s = p->s;
+    tlsphi_block *block = p->s->block + i;
+    const tlsphi_body *body = s->body + block->body;
+    double origin[3], z[3], T[3], zT[3];
+    memset(block->moments, 0, sizeof block->moments);
+    tlsphi_stage_arm(s, &p->stage, p->dt, body->first, origin);
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_stage_arm(s, &p->stage, p->dt, a, z);
+        for (int k = 0; k < 3; k++) z[k] -= origin[k];
+        tlsphi_vector3(s->rate_p + (size_t)s->dim * a, s->dim, T);
+        tlsphi_cross3(z, T, zT);
+        for (int k = 0; k < 3; k++) block->moments[k] += (double)s->V[a] * zT[k];
+    }
+}
+/* The work of the settling turn stays out of E, and is seen from the body's mean motion, because the turn has no resultant. */
+static void tlsphi_settle_energy_task(void *arg, size_t i) {
+    const tlsphi_projection *p = (const tlsphi_projection *)arg;
+    tlsph_solver *s = p->s;
+    const tlsphi_block *block = s->block + i;
+    const tlsphi_body *body = s->body + block->body;
+    double centre[3], X[3], turn[3];
+    tlsphi_projection_centre(p, block, centre);
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_projection_arm(p, centre, a, X);
+        tlsphi_cross3(body->lambda, X, turn);
+        for (int k = 0; k < s->dim; k++) {
+            const double relative = (double)s->v[(size_t)s->dim * a + (size_t)k] - body->v_mean[k];
+            s->rate_E[a] -= (tlsph_real)((turn[k] + body->linear[k]) * relative);
+        }
+    }
+}
 /* Adds the blocks' moments body by body, in block order, and hands them to `solve`. */
 static void tlsphi_each_body(tlsph_solver *s, void (*solve)(tlsphi_body *body, const double *moments)) {
     for (size_t i = 0; i < s->blocks;) {
@@ -3431,10 +3547,9 @@ static void tlsphi_find_rigid_motion(tlsphi_projection *p) {
     tlsphi_each_body(p->s, tlsphi_rigid_motion);
     tlsphi_run_tasks(p->s, tlsphi_relative_task, p);
 }
-/* Algorithm 1 line (5). */
-static void tlsphi_project(tlsphi_projection *p) {
+static void tlsphi_project_forces(tlsphi_projection *p, void (*solve)(tlsphi_body *body, const double *moments)) {
     tlsphi_run_tasks(p->s, tlsphi_torque_task, p);
-    tlsphi_each_body(p->s, tlsphi_multipliers);
+    tlsphi_each_body(p->s, solve);
     for (size_t i = 0; i < p->s->bodies; i++) {
         const tlsphi_body *b = p->s->body + i;
         double spin_moment[3] = {0, 0, 0};
@@ -3444,6 +3559,27 @@ static void tlsphi_project(tlsphi_projection *p) {
             (tlsphi_dot3(b->lambda, spin_moment) + b->volume * tlsphi_dot3(b->linear, b->v_mean));
     }
     tlsphi_run_tasks(p->s, tlsphi_correct_task, p);
+}
+/* In the last stage of a scheme with debts: z_next sum x_next x T = -debt. */
+static void tlsphi_settle(tlsphi_projection *p) {
+    p->stage.ahead = 1;
+    for (size_t i = 0; i < p->s->bodies; i++)
+        for (int k = 0; k < 3; k++) p->s->body[i].debt[k] /= p->stage.z_next;
+    tlsphi_run_tasks(p->s, tlsphi_rigid_task, p);
+    tlsphi_each_body(p->s, tlsphi_rigid_motion);
+    tlsphi_project_forces(p, tlsphi_pay_debt);
+    if (p->s->thermal == TLSPH_ENERGY) tlsphi_run_tasks(p->s, tlsphi_settle_energy_task, p);
+}
+/* Algorithm 1 line (5). */
+static void tlsphi_project(tlsphi_projection *p) {
+    const tlsphi_stage *stage = &p->stage;
+    tlsphi_project_forces(p, tlsphi_multipliers);
+    if (p->s->linear) return;
+    if (stage->z_was != 0) {
+        tlsphi_run_tasks(p->s, tlsphi_debt_task, p);
+        tlsphi_each_body(p->s, tlsphi_add_debt);
+    }
+    if (stage->z_next > 0 && !stage->ahead) tlsphi_settle(p);
 }
 
 /* ==== [RHS] ========================================================================================================
@@ -3466,7 +3602,7 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
     if (s->projection) tlsphi_find_rigid_motion(&projection);
     tlsphi_run(s, tlsphi_gradient_block);
     if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block);
-    if (s->laplacian) tlsphi_run(s, tlsphi_laplacian_block);
+    if (s->laplacian && s->damps) tlsphi_run(s, tlsphi_laplacian_block);
     tlsphi_run(s, tlsphi_flux_block);
     tlsphi_collect_sums(s, stage->rate_weight * dt);
     if (s->projection) tlsphi_project(&projection);
@@ -3474,10 +3610,15 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
 }
 
 /* ==== [STEP] =======================================================================================================
-   Two-stage TVD Runge-Kutta (000-77), geometry in the same scheme. */
+   Runge-Kutta schemes as tables, geometry in the same scheme.
+
+   Frozen dissipation. Stages u0 + c dt (L(u) + D(u0)) keep the forces T_D, D_J of the step's beginning, but heat must be
+   what these take from the motion now: the share of a particle is share_0 - (w - w_0).T_D - (Sigma_J - Sigma_J0) D_J, whose
+   sum over the body is -sum (w.T_D + Sigma_J D_J) as before, so that the energy is conserved to round-off. Given up: within
+   a step w may turn against T_D, so that a share, and the production of a pair, may be negative by O(dt) of itself. */
 
 /* dH/dt = F x grad v, before F itself changes. */
-static void tlsphi_update_cofactor(tlsph_solver *s, size_t a, tlsph_real A, tlsph_real B, tlsph_real dt) {
+static void tlsphi_update_cofactor(tlsph_solver *s, size_t a, tlsph_real B, tlsph_real C) {
     const int dim = s->dim;
     const size_t dd = (size_t)(dim * dim);
     tlsph_real F[9], G[9], rate[9], in_plane[9];
@@ -3486,43 +3627,42 @@ static void tlsphi_update_cofactor(tlsph_solver *s, size_t a, tlsph_real A, tlsp
     tlsph_cross(F, G, rate);
     tlsphi_shrink(dim, rate, in_plane);
     for (size_t i = dd * a; i < dd * (a + 1); i++)
-        s->now.H[i] = A * s->old.H[i] + B * (s->now.H[i] + dt * in_plane[i - dd * a]);
+        s->now.H[i] = s->old.H[i] + B * (s->now.H[i] - s->old.H[i]) + C * in_plane[i - dd * a];
 }
 /* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
 static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
     const size_t D = (size_t)s->dim;
     s->rate_E[a] += tlsphi_dot(s->dim, s->v + D * a, s->rate_p + D * a);
 }
-/* u = A old + B (u + dt rate) over the entries [begin, end). */
+/* u = a old + b u + c dt rate over the entries [begin, end), written so that a + b = 1 has no round-off. */
 static void tlsphi_combine(tlsph_real *u, const tlsph_real *old, const tlsph_real *rate, size_t begin, size_t end,
-                           tlsph_real A, tlsph_real B, tlsph_real dt) {
-    for (size_t i = begin; i < end; i++) u[i] = A * old[i] + B * (u[i] + dt * rate[i]);
+                           tlsph_real B, tlsph_real C) {
+    for (size_t i = begin; i < end; i++) u[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
 }
 typedef struct tlsphi_update {
     tlsph_solver *s;
-    tlsph_real A, B, dt;
+    tlsph_real B, C;
 } tlsphi_update;
 
 static void tlsphi_update_task(void *arg, size_t i) {
     const tlsphi_update *up = (const tlsphi_update *)arg;
     tlsph_solver *s = up->s;
     const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
-    const tlsph_real A = up->A, B = up->B, dt = up->dt;
-    for (size_t a = begin; s->has_H && a < end; a++) tlsphi_update_cofactor(s, a, A, B, dt);
+    const tlsph_real B = up->B, C = up->C;
+    for (size_t a = begin; s->has_H && a < end; a++) tlsphi_update_cofactor(s, a, B, C);
     for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
-    tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, A, B, dt);
-    tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, A, B, dt);
-    tlsphi_combine(s->now.F, s->old.F, s->rate_F, dd * begin, dd * end, A, B, dt);
-    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, A, B, dt);
-    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, A, B, dt);
+    tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, B, C);
+    tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, B, C);
+    tlsphi_combine(s->now.F, s->old.F, s->rate_F, dd * begin, dd * end, B, C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, B, C);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, B, C);
 }
 /* Algorithm 1 line (6). */
 static void tlsphi_evolve(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
     tlsphi_update up;
     up.s = s;
-    up.A = (tlsph_real)stage->a;
     up.B = (tlsph_real)stage->b;
-    up.dt = (tlsph_real)dt;
+    up.C = (tlsph_real)(stage->c * dt);
     tlsphi_run_tasks(s, tlsphi_update_task, &up);
 }
 
@@ -3576,14 +3716,40 @@ TLSPHI_DEF tlsph_real tlsph_stable_time_step(const tlsph_solver *s) {
     return (tlsph_real)dt;
 }
 
+/* a, b, c | start, end | rate and after weight | z: old, next, was, is | ahead */
+typedef struct tlsphi_scheme {
+    int stages;
+    double cfl_limit;
+    tlsphi_stage stage[4];
+} tlsphi_scheme;
+static const tlsphi_scheme tlsphi_schemes[4] = {
+    {2, 0.40, {{0, 1, 1, 0, 1, 1. / 2, 1. / 2, 1. / 2, 0, 0, 0, 0},
+              {1. / 2, 1. / 2, 1. / 2, 1, 1, 1. / 2, 1, 0, 1. / 2, 0, 0, 1}}},
+    {3, 0.50, {{0, 1, 1, 0, 1, 1. / 6, 1. / 6, 1. / 6, 0, -1. / 6, 0, 0},
+              {3. / 4, 1. / 4, 1. / 4, 1, 1. / 2, 1. / 6, 2. / 3, 1. / 6, 0, -1. / 36, 1. / 36, 0},
+              {1. / 3, 2. / 3, 2. / 3, 1. / 2, 1, 2. / 3, 1, 0, 2. / 3, 0, 0, 0}}},
+    {3, 0.40, {{1, 0, 1. / 3, 0, 1. / 3, 0, 0, 0, 0, 0, 0, 0},
+              {1, 0, 1. / 2, 1. / 3, 1. / 2, 0, 0, 0, 0, -1. / 2, 0, 0},
+              {1, 0, 1, 1. / 2, 1, 1, 1, 0, 1, 0, 0, 0}}},
+    {4, 0.40, {{1, 0, 1. / 4, 0, 1. / 4, 0, 0, 0, 0, 0, 0, 0},
+              {1, 0, 1. / 3, 1. / 4, 1. / 3, 0, 0, 0, 0, 0, 0, 0},
+              {1, 0, 1. / 2, 1. / 3, 1. / 2, 0, 0, 0, 0, -1. / 2, 0, 0},
+              {1, 0, 1, 1. / 2, 1, 1, 1, 0, 1, 0, 0, 0}}}};
+
+TLSPHI_DEF tlsph_real tlsph_cfl_limit(tlsph_integrator integrator) {
+    return (unsigned)integrator < 4 ? (tlsph_real)tlsphi_schemes[integrator].cfl_limit : 0;
+}
+
 /* Algorithm 1, from state n to n + 1. */
 static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
-    static const tlsphi_stage stages[2] = {{0, 1, 0, 1, 0.5, 0.5, 0}, {0.5, 0.5, 1, 1, 0.5, 1, 1}};
+    const tlsphi_scheme *scheme = tlsphi_schemes + s->integrator;
     tlsphi_keep_state(s); /* (1) u_old, x_old                     */
-    for (int k = 0; k < 2; k++) {
-        tlsphi_right_hand_side(s, &stages[k], dt);    /* (4) rates, (5) projection            */
-        tlsphi_evolve(s, &stages[k], dt);             /* (6) u = a u_old + b (u + dt L)       */
-        tlsphi_impose(s, &stages[k], dt);             /* (7) constraints                      */
+    for (int k = 0; k < scheme->stages; k++) {
+        const tlsphi_stage *stage = scheme->stage + k;
+        s->damps = k == 0 || !s->frozen;
+        tlsphi_right_hand_side(s, stage, dt);         /* (4) rates, (5) projection            */
+        tlsphi_evolve(s, stage, dt);                  /* (6) u = a u_old + b u + c dt L       */
+        tlsphi_impose(s, stage, dt);                  /* (7) constraints                      */
         const tlsphi_block *bad = tlsphi_evaluate(s); /* (8) stress, (9) temperature          */
         if (bad) {
             const tlsph_result result = tlsphi_describe_failure(s, bad, "step");
@@ -4088,7 +4254,7 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"jump_share", (double)d->jump_share, 0, 100, "0 to 100"},
         {"drift_relaxation", (double)d->drift_relaxation, 0, 100, "0 to 100"},
         {"conduction", (double)d->conduction, TLSPH_COMPACT, TLSPH_DOUBLE_GRADIENT, "a tlsph_conduction"},
-        {"integrator", (double)d->integrator, TLSPH_RK2, TLSPH_RK2, "a tlsph_integrator"},
+        {"integrator", (double)d->integrator, TLSPH_RK2, TLSPH_RK4_FROZEN, "a tlsph_integrator"},
         {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
         {"threads", (double)d->threads, 0, 4096, "0 to 4096"},
         {"particles.spacing", (double)d->particles.spacing, 0, TLSPHI_LARGEST, "0 (from the weights) or more"},
@@ -4334,6 +4500,9 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->jump_share = d->volume_coupling == TLSPH_SPLIT ? d->jump_share : 1;
     s->drift_relaxation = d->drift_relaxation;
     s->cfl = d->cfl;
+    s->integrator = d->integrator;
+    s->frozen = d->integrator >= TLSPH_RK3_FROZEN && d->dissipation != TLSPH_NO_DISSIPATION;
+    s->damps = 1;
     s->bonds = plan->bond != NULL;
     s->force_form = d->force_form;
     s->step_rule = d->step_rule;
@@ -4392,6 +4561,7 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->PM = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
     s->A = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
     s->wave = TLSPHI_TAKE(arena, tlsph_real, 4 * n);
+    if (s->frozen) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
     s->w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * n) : s->v;
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
     s->P_flux = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->PM;
