@@ -273,5 +273,31 @@ void impact_read(const impact *bar, double shock_speed, double from, double to, 
    and without memory, so that checks of bounds fail. `field` must have one component; `values` one a particle, host order. */
 double scene_oscillation(const tlsph_solver *solver, tlsph_field field);
 double scene_oscillation_of(const tlsph_solver *solver, const tlsph_real *values);
+/* ---- twisting column: 001 section 7.3.1 -------------------------------------------------------------------------- */
+
+typedef struct twisting_column_parameters {
+    scene_options options;
+    int n;                /* spacings across 1 m */
+    double nu;            /* Poisson's ratio */
+    double omega;         /* rad/s, of the initial angular velocity at the top */
+} twisting_column_parameters;
+
+typedef struct twisting_column {
+    scene_body body;
+    twisting_column_parameters parameters;
+} twisting_column;
+
+typedef struct twisting_column_shape {
+    double tip_height;       /* m, of the top face's centre */
+    double tip_twist;        /* rad, of the top face, whole turns counted from reading to reading */
+    double axis[2];          /* m, X and Z of the top face's centre */
+    double axis_velocity[2]; /* m/s */
+} twisting_column_shape;
+
+void twisting_column_default(twisting_column_parameters *parameters);
+tlsph_result twisting_column_create(const twisting_column_parameters *parameters, twisting_column *out,
+                                    tlsph_error *error);
+/* Brings *shape (zero before the first reading) up to date; call it after each step, so that no turn is missed. */
+void twisting_column_read(const twisting_column *column, twisting_column_shape *shape);
 
 #endif
