@@ -191,6 +191,26 @@ int driver_render(driver *d, const char *file, const ex_view *view, const driver
     return bad;
 }
 
+static double next_moment(const driver_moment *moments, int count, double t, double end) {
+    for (int i = 0; i < count; i++) if (moments[i].time > t) end = fmin(end, moments[i].time);
+    return end;
+}
+
+tlsph_result driver_run_moments(driver *d, double end, const driver_moment *moments, driver_snapshot *shots, int count) {
+    double t = (double)tlsph_time(d->body->solver), stop = t;
+    do {
+        if (driver_run_to(d, stop) != TLSPH_OK) break;
+        t = stop;
+        for (int i = 0; i < count; i++)
+            if (moments[i].time <= t && moments[i].time >= t)
+                driver_snap(d->body, moments[i].field, moments[i].component, moments[i].scale, &shots[i]);
+        stop = next_moment(moments, count, t, end);
+    } while (t < end);
+    return d->result;
+}
+
+/* ---- curves ------------------------------------------------------------------------------------------------------ */
+
 void driver_history_add(driver_history *h, double time, const double *values) {
     const size_t columns = (size_t)h->columns;
     if (h->count == h->capacity && !h->bad) {
@@ -219,6 +239,63 @@ void driver_history_free(driver_history *h) {
     h->count = h->capacity = 0;
 }
 
+#define MOST_COLUMNS 32
+
+int driver_table(driver *d, const char *file, const char *header, const driver_history *h) {
+    double row[MOST_COLUMNS + 1];
+    ex_csv csv;
+    if (ex_csv_open(&csv, d->folder, file, header)) return 1;
+    for (size_t i = 0; i < h->count; i++) {
+        row[0] = h->time[i];
+        memcpy(row + 1, h->values + i * (size_t)h->columns, (size_t)h->columns * sizeof *row);
+        ex_csv_row(&csv, row);
+    }
+    ex_csv_close(&csv);
+    return 0;
+}
+
+tlsph_result driver_record(scene_body *body, double end, double interval, driver_probe_fn probe, void *user,
+                           driver_history *h) {
+    const double close = 1e-10 * fabs(end); /* a rest that is round-off is no step */
+    double row[MOST_COLUMNS] = { 0 }, next = 0, t = (double)tlsph_time(body->solver);
+    tlsph_result result = TLSPH_OK;
+    while (result == TLSPH_OK) {
+        if (t >= next || end - t <= close) {
+            probe(user, row);
+            driver_history_add(h, t, row);
+            next = interval > 0 ? interval * (floor(t / interval) + 1) : t;
+        }
+        if (end - t <= close) break;
+        result = tlsph_step(body->solver, (tlsph_real)(end - t));
+        t = (double)tlsph_time(body->solver);
+    }
+    return result;
+}
+
+/* Value of a column at a time between the first row and the last; `at` is a row not after it. */
+static double interpolate(const driver_history *h, int column, double t, size_t *at) {
+    const size_t columns = (size_t)h->columns, c = (size_t)column;
+    double share;
+    while (*at + 2 < h->count && h->time[*at + 1] < t) (*at)++;
+    if (*at + 1 >= h->count) return h->values[*at * columns + c];
+    share = (t - h->time[*at]) / (h->time[*at + 1] - h->time[*at]);
+    return (1 - share) * h->values[*at * columns + c] + share * h->values[(*at + 1) * columns + c];
+}
+
+double driver_difference(const driver_history *a, const driver_history *b, int column) {
+    double low = HUGE_VAL, high = -HUGE_VAL, worst = 0;
+    size_t at = 0;
+    if (!a->count || !b->count) return HUGE_VAL;
+    for (size_t i = 0; i < a->count && a->time[i] <= b->time[b->count - 1]; i++) {
+        const double value = a->values[i * (size_t)a->columns + (size_t)column];
+        const double off = fabs(value - interpolate(b, column, a->time[i], &at));
+        if (!(off <= worst)) worst = off; /* keeps what is not a number */
+        low = fmin(low, value);
+        high = fmax(high, value);
+    }
+    return high > low ? worst / (high - low) : worst > 0 ? HUGE_VAL : 0;
+}
+
 #define MOST_CHARTS 8
 
 int driver_plot(driver *d, const char *file, const driver_history *h, const driver_chart *charts, int count,
@@ -243,5 +320,34 @@ int driver_plot(driver *d, const char *file, const driver_history *h, const driv
     bad = ex_plot_grid(driver_path(d, file), 640, 420, axes, panels, counts, count, columns);
     for (int i = 0; i < count && i < MOST_CHARTS; i++)
         for (int j = 0; j < counts[i]; j++) free((void *)curves[i][j].y);
+    return bad;
+}
+
+#define MOST_CURVES 8
+
+int driver_overlay(driver *d, const char *file, const driver_history *const *histories, const char *const *names,
+                   int count, const driver_panel *panels, int panel_count) {
+    ex_axes axes[MOST_CHARTS];
+    ex_curve curves[MOST_CHARTS][MOST_CURVES];
+    const ex_curve *of[MOST_CHARTS];
+    int counts[MOST_CHARTS], bad;
+    if (count > MOST_CURVES) count = MOST_CURVES;
+    if (panel_count > MOST_CHARTS) panel_count = MOST_CHARTS;
+    memset(axes, 0, sizeof axes);
+    for (int i = 0; i < panel_count; i++) {
+        axes[i].title = panels[i].title;
+        axes[i].x_label = "t [s]";
+        axes[i].y_label = panels[i].y_label;
+        for (int j = 0; j < count; j++) {
+            ex_curve curve = { names[j], histories[j]->time, driver_column(histories[j], i), histories[j]->count,
+                               j % 2, j };
+            curves[i][j] = curve;
+        }
+        of[i] = curves[i];
+        counts[i] = count;
+    }
+    bad = ex_plot_grid(driver_path(d, file), 640, 420, axes, of, counts, panel_count, panel_count < 2 ? 1 : 2);
+    for (int i = 0; i < panel_count; i++)
+        for (int j = 0; j < count; j++) free((void *)curves[i][j].y);
     return bad;
 }

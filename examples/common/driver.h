@@ -64,6 +64,11 @@ void driver_snapshot_free(driver_snapshot *snapshot);
 int driver_render(driver *d, const char *file, const ex_view *view, const driver_snapshot *snapshots, int count,
                   int columns, double radius);
 
+/* What is kept at which time, for runs that draw many instants. */
+typedef struct driver_moment { double time; tlsph_field field; int component; double scale; } driver_moment;
+/* Steps until `end` (s), meeting each moment exactly and keeping shots[i] there; moments past the end stay empty. */
+tlsph_result driver_run_moments(driver *d, double end, const driver_moment *moments, driver_snapshot *shots, int count);
+
 /* Curves that grow: one column of times and `columns` of values. */
 typedef struct driver_history {
     double *time, *values;  /* values column by column once closed: see driver_column */
@@ -76,9 +81,21 @@ void driver_history_add(driver_history *history, double time, const double *valu
 /* A copy of one column, to be freed. */
 double *driver_column(const driver_history *history, int column);
 void driver_history_free(driver_history *history);
+/* Writes a history as CSV; the header names the time too. */
+int driver_table(driver *d, const char *file, const char *header, const driver_history *history);
+/* Runs a body to `end` without files and adds a row of probe(user, row) at t = 0 and about every `interval` (s). */
+typedef void (*driver_probe_fn)(void *user, double *row);
+tlsph_result driver_record(scene_body *body, double end, double interval, driver_probe_fn probe, void *user,
+                           driver_history *history);
+/* Largest difference of a column of two histories over the time that both cover, by the range of a's; b is interpolated. */
+double driver_difference(const driver_history *a, const driver_history *b, int column);
 /* Draws panels of curves: panel i has title, axis label and the columns first[i] ... first[i + 1] - 1 with their names. */
 typedef struct driver_chart { const char *title, *y_label; int first, count; const char *names[4]; } driver_chart;
 int driver_plot(driver *d, const char *file, const driver_history *history, const driver_chart *charts, int count,
                 int columns);
+/* Draws one panel for each of columns 0 ... panels - 1 of several histories, each history a curve with its name. */
+typedef struct driver_panel { const char *title, *y_label; } driver_panel;
+int driver_overlay(driver *d, const char *file, const driver_history *const *histories, const char *const *names,
+                   int count, const driver_panel *panels, int panel_count);
 
 #endif

@@ -112,10 +112,9 @@ static void describe(tlsph_error *error, tlsph_result result) {
     snprintf(error->message, sizeof error->message, "scene: %s", tlsph_result_text(result));
 }
 
-/* Memory that lives until scene_end; NULL after a failure. */
-static void *keep(scene_setup *setup, size_t size) {
+void *scene_keep(scene_setup *setup, size_t size) {
     void *memory = NULL;
-    if (setup->result == TLSPH_OK && setup->list_count < 2 * SCENE_CONDITIONS) memory = malloc(size ? size : 1);
+    if (setup->result == TLSPH_OK && setup->list_count < 3 * SCENE_CONDITIONS) memory = malloc(size ? size : 1);
     if (memory) setup->lists[setup->list_count++] = memory;
     else if (setup->result == TLSPH_OK) setup->result = TLSPH_ERROR_MEMORY;
     return memory;
@@ -142,7 +141,7 @@ static int on_plane(void *user, const tlsph_real X[3]) {
 tlsph_condition *scene_add_where(scene_setup *setup, tlsph_condition_kind kind, tlsph_inside_fn inside, void *user) {
     const tlsph_particles *particles = &setup->body.cloud.particles;
     tlsph_condition *condition = scene_add(setup, kind);
-    uint32_t *list = keep(setup, particles->count * sizeof *list);
+    uint32_t *list = scene_keep(setup, particles->count * sizeof *list);
     if (list) {
         condition->count = tlsph_select(particles, inside, user, list, particles->count);
         condition->particles = list;
@@ -175,7 +174,7 @@ void scene_add_rollers(scene_setup *setup, int axis) {
 
 void scene_share_area(scene_setup *setup, tlsph_condition *condition, double area) {
     const tlsph_real *volumes = setup->body.cloud.particles.volumes;
-    tlsph_real *areas = keep(setup, condition->count * sizeof *areas);
+    tlsph_real *areas = scene_keep(setup, condition->count * sizeof *areas);
     double sum = 0;
     if (!areas) return;
     for (size_t i = 0; i < condition->count; i++) sum += (double)volumes[condition->particles[i]];
@@ -268,6 +267,14 @@ tlsph_real *scene_read(const tlsph_solver *solver, tlsph_field field) {
     if (out && tlsph_read(solver, field, out) == TLSPH_OK) return out;
     free(out);
     return NULL;
+}
+
+double scene_value(const tlsph_solver *solver, tlsph_field field, size_t particle, int component) {
+    tlsph_real *values = scene_read(solver, field);
+    const size_t at = particle * (size_t)tlsph_field_components(field) + (size_t)component;
+    const double out = values ? (double)values[at] : (double)NAN;
+    free(values);
+    return out;
 }
 
 size_t scene_nearest(const tlsph_particles *particles, double x, double y, double z) {
