@@ -3,6 +3,7 @@
 #   make            examples -> build/<example>         make test    unit and physics tests, about 2 minutes
 #   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
 #   make bench      timings                             make coverage, make clean
+#   make portability    the tests with other compilers, C libraries, machines and systems, as far as installed
 #
 # CFLAGS are yours (default -O3 -march=native); threads: OMP_NUM_THREADS or --threads of the examples.
 
@@ -112,11 +113,15 @@ coverage: build/test_coverage
 	@sed -n "/^File.*tlsph.h'/,/^$$/p" build/obj/coverage/gcov.txt
 	@sed -n "/^File.*tlsph.h'/,/^$$/s/^Taken at least once:\([0-9.]*\)%.*/result branch_coverage \1 %/p" build/obj/coverage/gcov.txt
 
+# Other compilers, C libraries, word sizes, byte orders, Windows.
+portability:
+	@sh tests/portability.sh
+
 clean:
 	rm -rf build out
 
 FORCE:
-.PHONY: all demo bench test check check-only coverage clean FORCE
+.PHONY: all demo bench test check check-only coverage portability clean FORCE
 .SECONDARY:
 
 -include $(shell find build/obj -name '*.d' 2> /dev/null)

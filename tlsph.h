@@ -61,7 +61,7 @@ PROMISES
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [MATERIALS] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES] [CONDITIONS] [PROJECTION]
-  [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [FILL] [LICENCE]
+  [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST] [FILL] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -260,6 +260,17 @@ typedef struct tlsph_material_state {
     tlsph_real internal_energy, helmholtz;      /* J/m^3 */
     tlsph_real c_p, c_s;                        /* bounds of the isentropic wave speeds over all directions, m/s */
 } tlsph_material_state;
+
+/* What tlsph_material_check found, largest over its samples; stresses and energies over the stiffness at the sample. */
+typedef struct tlsph_material_report {
+    double derivative;    /* |P - d psi/dF| */
+    double entropy;       /* |eta + d psi/d theta| theta */
+    double symmetry;      /* of dP/dF */
+    double objectivity;   /* |P(Q F) - Q P(F)| and of the energy, Q a rotation */
+    double hyperbolicity; /* least eigenvalue of an acoustic tensor: where it is negative, waves grow; not judged */
+    double wave_bound;    /* least of the bound of rho c_p^2 over the true isentropic value */
+    int inverted;         /* samples left out because det F was not positive */
+} tlsph_material_report;
 
 /* Boundary conditions, loads and contact. Angle brackets: what `value` means. */
 typedef enum tlsph_condition_kind {
@@ -588,6 +599,11 @@ TLSPH_API void tlsph_kernel_evaluate(tlsph_kernel kernel, int dimension, tlsph_r
    ERROR_MATERIAL for impossible constants, ERROR_INVERSION for det F <= 0, ERROR_TEMPERATURE for theta <= 0. */
 TLSPH_API tlsph_result tlsph_material_evaluate(const tlsph_material *material, const tlsph_real *F, tlsph_real theta,
                                                tlsph_material_state *out);
+/* Tests a material, above all a user's, at `samples` random states F = I + entries up to `strain`, theta within a quarter
+   of theta_R: is P the derivative of the energy, eta of it too, is it objective, do the moduli bound its wave speeds?
+   ERROR_MATERIAL with the first property that fails; the report is filled in any case. */
+TLSPH_API tlsph_result tlsph_material_check(const tlsph_material *material, double strain, int samples,
+                                            tlsph_material_report *report, tlsph_error *error);
 /* Dissipative fluxes into side a of one pair: C, c reference and current area vectors (C_ab^skew, c_ab^skew, m^2),
    d = X_b - X_a (m), a_J the factor of the J dissipation (0 where J is not evolved). production >= 0 is the power turned
    into heat, half of it on each side. Source: METHOD section "Dissipation", 000 (66)-(76). */
@@ -5002,6 +5018,175 @@ TLSPHI_DEF tlsph_condition tlsph_condition_default(tlsph_condition_kind kind) {
     c.cookie = TLSPHI_COOKIE;
     c.kind = kind;
     return c;
+}
+
+/* ==== [SELF-TEST] ==================================================================================================
+   Is a material what the solver takes it for? All by central differences of tlsph_material_evaluate, so that a user's
+   callback is asked in the way in which a step asks it. */
+
+typedef struct tlsphi_trial {
+    const tlsph_material *material;
+    double F[9], theta, scale; /* scale: of stiffness at F, Pa */
+    tlsph_result result;       /* of the first evaluation that failed */
+    tlsph_material_state at;
+} tlsphi_trial;
+
+static void tlsphi_try(tlsphi_trial *trial, const double F[9], double theta, tlsph_material_state *out) {
+    tlsph_real real[9];
+    for (int i = 0; i < 9; i++) real[i] = (tlsph_real)F[i];
+    const tlsph_result result = tlsph_material_evaluate(trial->material, real, (tlsph_real)theta, out);
+    if (result && !trial->result) trial->result = result;
+    if (result) memset(out, 0, sizeof *out);
+}
+/* F + step in entry k, where rounding leaves the step that is divided by. */
+static double tlsphi_try_beside(tlsphi_trial *trial, int k, double step, tlsph_material_state *out) {
+    double F[9];
+    memcpy(F, trial->F, sizeof F);
+    F[k] = (double)(tlsph_real)(F[k] + step);
+    tlsphi_try(trial, F, trial->theta, out);
+    return F[k];
+}
+/* dP/dF (row: entry of P) and the error of P against d psi/dF. */
+static void tlsphi_try_tangent(tlsphi_trial *trial, double A[81], tlsph_material_report *report) {
+    const double step = cbrt(TLSPHI_EPSILON);
+    tlsph_material_state low, high;
+    double scale = (double)trial->material->young;
+    for (int k = 0; k < 9; k++) {
+        const double below = tlsphi_try_beside(trial, k, -step, &low), above = tlsphi_try_beside(trial, k, step, &high);
+        for (int i = 0; i < 9; i++) A[9 * i + k] = ((double)high.P[i] - (double)low.P[i]) / (above - below);
+        scale = tlsphi_dmax(scale, fabs(A[10 * k]));
+    }
+    trial->scale = scale;
+    for (int k = 0; k < 9; k++) {
+        const double below = tlsphi_try_beside(trial, k, -step, &low), above = tlsphi_try_beside(trial, k, step, &high);
+        const double slope = ((double)high.helmholtz - (double)low.helmholtz) / (above - below);
+        report->derivative = tlsphi_dmax(report->derivative, fabs(slope - (double)trial->at.P[k]) / scale);
+        for (int i = 0; i < k; i++)
+            report->symmetry = tlsphi_dmax(report->symmetry, fabs(A[9 * i + k] - A[9 * k + i]) / scale);
+    }
+}
+/* eta = -d psi/d theta; out: -dP/d theta. */
+static void tlsphi_try_heat(tlsphi_trial *trial, double out[9], tlsph_material_report *report) {
+    const double theta = trial->theta, step = cbrt(TLSPHI_EPSILON) * theta;
+    const double below = (double)(tlsph_real)(theta - step), above = (double)(tlsph_real)(theta + step);
+    tlsph_material_state low, high;
+    tlsphi_try(trial, trial->F, below, &low);
+    tlsphi_try(trial, trial->F, above, &high);
+    const double slope = ((double)high.helmholtz - (double)low.helmholtz) / (above - below);
+    report->entropy = tlsphi_dmax(report->entropy, fabs(slope + (double)trial->at.eta) * theta / trial->scale);
+    for (int i = 0; i < 9; i++) out[i] = ((double)low.P[i] - (double)high.P[i]) / (above - below);
+}
+/* P(Q F) = Q P(F) and the same energy. */
+static void tlsphi_try_turned(tlsphi_trial *trial, const double Q[9], tlsph_material_report *report) {
+    tlsph_material_state turned;
+    double QF[9] = {0};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++) QF[3 * i + j] += Q[3 * i + k] * trial->F[3 * k + j];
+    tlsphi_try(trial, QF, trial->theta, &turned);
+    for (int i = 0; i < 9; i++) {
+        double QP = 0;
+        for (int k = 0; k < 3; k++) QP += Q[3 * (i / 3) + k] * (double)trial->at.P[3 * k + i % 3];
+        report->objectivity = tlsphi_dmax(report->objectivity, fabs((double)turned.P[i] - QP) / trial->scale);
+    }
+    report->objectivity =
+        tlsphi_dmax(report->objectivity, fabs((double)(turned.helmholtz - trial->at.helmholtz)) / trial->scale);
+}
+/* Acoustic tensor along N: isothermal for hyperbolicity, isentropic against the bound of the wave speed. */
+static void tlsphi_try_waves(const tlsphi_trial *trial, const double A[81], const double heat[9], const double N[3],
+                             tlsph_material_report *report) {
+    const tlsph_material *m = trial->material;
+    const double c_v = (double)m->density * (double)m->specific_heat, rho = (double)m->density;
+    double slow[9], fast[9], h[3] = {0, 0, 0}, Q[9];
+    for (int i = 0; i < 9; i++) h[i / 3] += heat[i] * N[i % 3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            double sum = 0;
+            for (int J = 0; J < 3; J++)
+                for (int L = 0; L < 3; L++) sum += A[9 * (3 * i + J) + 3 * k + L] * N[J] * N[L];
+            slow[3 * i + k] = sum;
+            fast[3 * i + k] = sum + (c_v > 0 ? trial->theta / c_v * h[i] * h[k] : 0);
+        }
+    tlsphi_eigen(slow, Q);
+    tlsphi_eigen(fast, Q);
+    const double least = tlsphi_dmin(slow[0], tlsphi_dmin(slow[4], slow[8])) / trial->scale;
+    const double most = tlsphi_dmax(fast[0], tlsphi_dmax(fast[4], fast[8]));
+    const double bound = rho * (double)trial->at.c_p * (double)trial->at.c_p;
+    report->hyperbolicity = tlsphi_dmin(report->hyperbolicity, least);
+    if (most > 0) report->wave_bound = tlsphi_dmin(report->wave_bound, bound / most);
+}
+
+static double tlsphi_try_random(uint64_t *seed) { /* -1 to 1 */
+    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*seed >> 33) / 1073741824.0 - 1;
+}
+/* F = I + entries up to `strain`, a turn (about a random axis, its eigenvectors by a random symmetric tensor), N. */
+static void tlsphi_try_sample(uint64_t *seed, double strain, double F[9], double Q[9], double N[3]) {
+    double S[9];
+    for (int i = 0; i < 9; i++) F[i] = (i % 4 == 0) + strain * tlsphi_try_random(seed);
+    for (int i = 0; i < 9; i++) S[i] = i % 3 < i / 3 ? S[3 * (i % 3) + i / 3] : tlsphi_try_random(seed);
+    tlsphi_eigen(S, Q);
+    for (int i = 0; i < 3; i++) N[i] = Q[3 * i];
+    const double det = Q[0] * (Q[4] * Q[8] - Q[5] * Q[7]) + Q[1] * (Q[5] * Q[6] - Q[3] * Q[8]) +
+                       Q[2] * (Q[3] * Q[7] - Q[4] * Q[6]);
+    for (int i = 0; i < 9; i++) Q[i] *= det; /* a rotation, no reflection */
+}
+
+/* A linear material is not objective by its nature. */
+static tlsph_result tlsphi_report_fault(const tlsph_material *m, const tlsph_material_report *r, tlsph_error *error) {
+    const double rounding = pow(TLSPHI_EPSILON, 0.5); /* differences: 2/3 of the digits, and a margin */
+    const struct {
+        const char *name;
+        double value, limit;
+        int least;
+        const char *allowed;
+    } rules[] = {
+        {"derivative", r->derivative, rounding, 0, "round-off: P = d psi/dF"},
+        {"entropy", r->entropy, rounding, 0, "round-off: eta = -d psi/d theta"},
+        {"symmetry", r->symmetry, 10 * rounding, 0, "round-off: dP/dF is symmetric"},
+        {"objectivity", m->kind == TLSPH_LINEAR ? 0 : r->objectivity, rounding, 0, "round-off: P(Q F) = Q P(F)"},
+        {"wave_bound", r->wave_bound, 0.99, 1, "1 or more: p_modulus bounds rho c_p^2"},
+    };
+    for (size_t i = 0; i < sizeof rules / sizeof *rules; i++)
+        if (!(rules[i].least ? rules[i].value >= rules[i].limit : rules[i].value <= rules[i].limit))
+            return tlsphi_fail(error, TLSPH_ERROR_MATERIAL, "material_check", rules[i].name, TLSPH_NO_PARTICLE,
+                               rules[i].value, rules[i].limit, rules[i].allowed);
+    return TLSPH_OK;
+}
+TLSPHI_DEF tlsph_result tlsph_material_check(const tlsph_material *material, double strain, int samples,
+                                             tlsph_material_report *report, tlsph_error *error) {
+    uint64_t seed = 1;
+    tlsphi_trial trial;
+    tlsphi_no_error(error);
+    if (!material || !report || !(strain >= 0) || samples < 1)
+        return tlsphi_fail(error, TLSPH_ERROR_ARGUMENT, "material_check", "strain", TLSPH_NO_PARTICLE, strain, 0,
+                           "0 or more, with 1 sample or more, a material and a report");
+    memset(report, 0, sizeof *report);
+    report->hyperbolicity = report->wave_bound = TLSPHI_LARGEST;
+    memset(&trial, 0, sizeof trial);
+    trial.material = material;
+    for (int i = 0; i < samples; i++) {
+        double A[81], heat[9], Q[9], N[3];
+        tlsphi_try_sample(&seed, strain, trial.F, Q, N);
+        trial.theta = (double)material->reference_temperature * (1 + tlsphi_try_random(&seed) / 4);
+        tlsphi_try(&trial, trial.F, trial.theta, &trial.at);
+        if (trial.result == TLSPH_ERROR_INVERSION) { /* too large a strain: another sample */
+            trial.result = TLSPH_OK;
+            report->inverted++;
+            continue;
+        }
+        tlsphi_try_tangent(&trial, A, report);
+        tlsphi_try_heat(&trial, heat, report);
+        tlsphi_try_turned(&trial, Q, report);
+        for (int k = 0; k < 3; k++) { /* three directions at right angles */
+            for (int j = 0; j < 3; j++) N[j] = Q[3 * j + k];
+            tlsphi_try_waves(&trial, A, heat, N, report);
+        }
+        if (trial.result)
+            return tlsphi_fail(error, trial.result, "material_check", "F[0]", TLSPH_NO_PARTICLE, trial.F[0], 0,
+                               "a state that the material can be evaluated at; lower strain");
+    }
+    return tlsphi_report_fault(material, report, error);
 }
 
 /* ==== [FILL] =======================================================================================================

@@ -5,3 +5,17 @@
 #endif
 #define TLSPH_IMPLEMENTATION
 #include "../tlsph.h"
+
+/* Whether the flags of this file let the compiler compute a*b + c with one rounding, keep more digits than a type holds,
+   or reorder: then bits differ from machine to machine. */
+int contracts_or_reorders(void);
+int contracts_or_reorders(void)
+{
+#if defined(__FAST_MATH__) || (defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0)
+    return 1;
+#else
+    volatile double third = 1.0 / 3, minus_one = -1;
+    const double a = third, c = minus_one;
+    return a * 3 + c != 0; /* 1/3 is rounded down: exactly, three of it are less than 1 */
+#endif
+}
