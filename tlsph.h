@@ -60,8 +60,8 @@ PROMISES
 
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
-  [MATERIALS] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES] [CONDITIONS] [PROJECTION]
-  [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST] [FILL] [LICENCE]
+  [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES] [CONDITIONS]
+  [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST] [FILL] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -218,6 +218,7 @@ typedef enum tlsph_material_kind {
     TLSPH_NEO_HOOKEAN, /* nearly incompressible neo-Hookean or Mooney-Rivlin, no thermal expansion */
     TLSPH_MEE,         /* modified entropic elasticity (000-26 to 29) */
     TLSPH_MIE_GRUNEISEN, /* (000-30 to 32) */
+    TLSPH_VON_MISES,     /* Hencky hyperelastic-plastic with isotropic hardening (001 Algorithm 2) */
     TLSPH_USER         /* the host's own, by a callback over arrays */
 } tlsph_material_kind;
 
@@ -248,6 +249,10 @@ typedef struct tlsph_material {
     tlsph_real reference_temperature; /* theta_R, K, > 0 */
     tlsph_real gruneisen_exponent;    /* q of (000-31), in [0, 1], default 1 */
     tlsph_real mooney_fraction;       /* share of the shear modulus carried by the H term, in [0, 1], default 0 */
+    tlsph_real yield_stress;          /* TLSPH_VON_MISES: Kirchhoff stress at first yield, Pa, > 0 */
+    tlsph_real hardening;             /* TLSPH_VON_MISES: its growth by equivalent plastic strain, Pa, >= 0 */
+    tlsph_real plastic_heat;          /* TLSPH_VON_MISES in thermal scenes: share of the plastic work that becomes heat,
+                                         in [0, 1], default 0; the rest stays stored in the material */
     tlsph_response_fn response;       /* for TLSPH_USER */
     void *response_user;
 } tlsph_material;
@@ -387,7 +392,7 @@ typedef struct tlsph_ledger {
     double mass, linear_momentum[3], angular_momentum[3]; /* x x p about the origin; linear materials only: X x p */
     double centre[3];                                     /* centre of mass */
     double kinetic_energy;
-    double strain_energy;    /* e_R (thermal) or Helmholtz energy at theta_R (isothermal) */
+    double strain_energy;    /* e_R (thermal, with stored plastic work) or Helmholtz energy at theta_R (isothermal) */
     double thermal_energy;   /* c_v (theta - theta_R) */
     double total_energy;     /* sum of the three */
     double ballistic_energy; /* total - theta_R entropy; isothermal: total */
@@ -395,16 +400,18 @@ typedef struct tlsph_ledger {
     double dissipation;            /* cumulative work turned into heat by D_p and D_J */
     double dissipation_entropy;    /* cumulative entropy made of it */
     double conduction_entropy;     /* cumulative entropy made by heat conduction */
+    double plastic_work;           /* work of plastic flow up to now; isothermal scenes: it has left total_energy */
+    double plastic_entropy;        /* entropy made of the share of it that became heat */
     double external_work;          /* cumulative, of loads and driven particles */
     double external_heat;          /* cumulative, into the body: sources, fluxes, prescribed temperatures */
     double external_entropy;       /* cumulative, that came with the external heat */
     double projection_work;        /* cumulative, on the rigid motion: what the dissipation had taken from it */
     double contact_loss;           /* cumulative kinetic energy stopped by walls (thermal scenes: turned into heat) */
     double impulse[3], angular_impulse[3]; /* cumulative, of loads (not of constraint reactions) */
-    double energy_residual;        /* total - initial - work - heat (- losses where these leave the energy) */
+    double energy_residual;        /* total - initial - work - heat (+ losses where these leave the energy) */
     double linear_residual[3];     /* momentum - initial - impulse; the reactions of constraints show here */
     double angular_residual[3];
-    double entropy_residual;       /* entropy - initial - the three productions: the time scheme's own */
+    double entropy_residual;       /* entropy - initial - the productions: the time scheme's own */
     double least_pair_production;  /* audit: least pair production since the reset / size of its terms; >= -1e-12 */
     double drift_largest;          /* largest |J / det F - 1| now */
     double jacobian_least;         /* least det F or J now */
@@ -418,7 +425,8 @@ typedef struct tlsph_ledger {
     X(TLSPH_FIELD_DISPLACEMENT, "displacement", "m", 3, 0)                                                             \
     X(TLSPH_FIELD_VELOCITY, "velocity", "m/s", 3, 1)             /* writing keeps the temperature */                   \
     X(TLSPH_FIELD_MOMENTUM, "momentum", "kg/(m^2 s)", 3, 0)      /* p per reference volume */                          \
-    X(TLSPH_FIELD_F, "deformation_gradient", "1", 9, 1)          /* writing sets H, J too, keeps the temperature */    \
+    X(TLSPH_FIELD_F, "deformation_gradient", "1", 9, 1)          /* writing sets H, J too, keeps the temperature;      \
+                                                                    plastic flow follows at once */                    \
     X(TLSPH_FIELD_H, "cofactor", "1", 9, 0)                                                                            \
     X(TLSPH_FIELD_J, "jacobian", "1", 1, 1)                      /* writable where it is evolved */                    \
     X(TLSPH_FIELD_DRIFT, "jacobian_drift", "1", 1, 0)            /* J / det F - 1 */                                   \
@@ -428,6 +436,7 @@ typedef struct tlsph_ledger {
     X(TLSPH_FIELD_STRESS, "first_piola_kirchhoff_stress", "Pa", 9, 0)                                                  \
     X(TLSPH_FIELD_PRESSURE, "pressure", "Pa", 1, 0)              /* P:F/(3J), tension positive as in the papers */     \
     X(TLSPH_FIELD_VON_MISES, "von_mises_stress", "Pa", 1, 0)                                                           \
+    X(TLSPH_FIELD_PLASTIC_STRAIN, "plastic_strain", "1", 1, 0)   /* equivalent; scenes with TLSPH_VON_MISES */         \
     X(TLSPH_FIELD_SIGMA_F, "sigma_F", "Pa", 9, 0)                                                                      \
     X(TLSPH_FIELD_SIGMA_H, "sigma_H", "Pa", 9, 0)                                                                      \
     X(TLSPH_FIELD_SIGMA_J, "sigma_J", "Pa", 1, 0)                                                                      \
@@ -950,7 +959,7 @@ TLSPHI_DEF void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real
 }
 
 /* Eigenvalues and vectors (columns of Q) of a symmetric 3x3 by cyclic Jacobi rotations. A is destroyed: its diagonal
-   becomes the eigenvalues, unordered. Only used at creation, in the projection and for error records. */
+   becomes the eigenvalues, unordered. Equal eigenvalues do no harm: no difference of them is ever divided by. */
 static void tlsphi_rotate(double A[9], double Q[9], int p, int q) {
     const double apq = A[3 * p + q];
     if (apq == 0) return;
@@ -973,6 +982,8 @@ static void tlsphi_rotate(double A[9], double Q[9], int p, int q) {
 static void tlsphi_eigen(double A[9], double Q[9]) {
     for (int i = 0; i < 9; i++) Q[i] = i % 4 == 0;
     for (int sweep = 0; sweep < 12; sweep++) {
+        const double off = fabs(A[1]) + fabs(A[2]) + fabs(A[5]), size = fabs(A[0]) + fabs(A[4]) + fabs(A[8]);
+        if (!(off > 1e-18 * size)) return;
         tlsphi_rotate(A, Q, 0, 1);
         tlsphi_rotate(A, Q, 0, 2);
         tlsphi_rotate(A, Q, 1, 2);
@@ -1760,6 +1771,7 @@ typedef struct tlsphi_material {
     tlsph_real zeta, gamma, k, beta, q; /* Pa, Pa, Pa, Pa/K, 1 */
     tlsph_real mu, kappa;               /* Pa */
     tlsph_real c_linear;                /* p speed of the undeformed body at constant temperature, m/s */
+    tlsph_real yield, hardening, heating; /* Pa, Pa, 1 */
     tlsph_response_fn response;
     void *user;
 } tlsphi_material;
@@ -1781,6 +1793,9 @@ static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
     out.zeta = (1 - m->mooney_fraction) * out.mu / 2;
     out.k = out.kappa - out.beta * out.theta_R * (1 - out.q);
     out.c_linear = tlsphi_sqrt((out.kappa + 4 * out.mu / 3) / out.rho);
+    out.yield = m->yield_stress;
+    out.hardening = m->hardening;
+    out.heating = m->plastic_heat;
     out.response = m->response;
     out.user = m->response_user;
     return out;
@@ -1863,6 +1878,10 @@ static tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsph
     return norm * norm;
 }
 
+/* Whether the deviatoric energy is one of the invariants of F and H above, with a, b, c. */
+static int tlsphi_has_invariants(tlsph_material_kind kind) {
+    return kind != TLSPH_LINEAR && kind != TLSPH_VON_MISES && kind != TLSPH_USER;
+}
 /* Bounds rho c^2 = [0] + theta [1]. J here is det F; with `coupled` = 0 the isothermal p speed. */
 static void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s, int coupled,
                           tlsph_response *out) {
@@ -1958,6 +1977,123 @@ TLSPHI_INLINE void tlsphi_drift(tlsph_real phi, tlsph_real scale, tlsph_real *W,
     *ddW = 1 + 3 * s2;
 }
 
+/* ==== [PLASTICITY] =================================================================================================
+   Von Mises plasticity with linear isotropic hardening on Hencky's elasticity (001 Algorithm 2). The inverse plastic
+   right Cauchy-Green tensor C_p^-1 gives the elastic b = F C_p^-1 F^T; with its principal logarithmic strains e_i, less
+   their mean,
+     e_R = mu sum e_i^2 + kappa/2 (ln J)^2 + beta theta_R ln J (+ stored plastic work)      eta_R = beta ln J
+     P = tau' F^-T + p H,   tau'_i = 2 mu e_i,   p = kappa ln J / J - beta (theta - theta_R)/J
+   so that the split of the J equation holds: tau' sees F, the volumetric terms see J. Where tau = sqrt(3/2 tau':tau')
+   is above yield + hardening x plastic strain, the flow shrinks e_i by one factor: that is the whole return map, in closed
+   form. It starts from the values at the beginning of the step in every stage, so that the last stage decides.
+
+   Plastic work is a function of the plastic strain, w = yield eps + hardening eps^2/2. Isothermal scenes lose it. In
+   thermal scenes the share `plastic_heat` becomes heat, the rest is stored (e_R). With the total energy E this needs no
+   source: the temperature follows from E less what is stored. The entropy so made is kept with the state. */
+
+typedef struct tlsphi_plastic {
+    tlsph_real C[9]; /* C_p^-1 */
+    tlsph_real strain, entropy; /* equivalent plastic strain; entropy made by plastic heat, J/(m^3 K) */
+} tlsphi_plastic;
+
+static const tlsphi_plastic tlsphi_virgin = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, 0, 0};
+
+TLSPHI_INLINE tlsph_real tlsphi_plastic_work(const tlsphi_material *m, tlsph_real strain) {
+    return strain * (m->yield + m->hardening * strain / 2);
+}
+/* Principal logarithmic elastic strains without their mean, directions in the columns of Q; returns sqrt(3/2 tau':tau').
+   In double also for float: a yield strain is a few thousandths. Jacobi rotations do not mind equal stretches. */
+static double tlsphi_elastic_strains(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *C, double Q[9],
+                                     double e[3]) {
+    double b[9], FC[9];
+    for (int i = 0; i < 9; i++) {
+        const int row = i / 3 * 3, column = i % 3;
+        FC[i] = (double)F[row] * (double)C[column] + (double)F[row + 1] * (double)C[3 + column] +
+                (double)F[row + 2] * (double)C[6 + column];
+    }
+    for (int i = 0; i < 9; i++) {
+        const int row = i / 3 * 3, other = i % 3 * 3;
+        b[i] = FC[row] * (double)F[other] + FC[row + 1] * (double)F[other + 1] + FC[row + 2] * (double)F[other + 2];
+    }
+    tlsphi_eigen(b, Q);
+    for (int i = 0; i < 3; i++) e[i] = log(b[4 * i]) / 2;
+    const double mean = (e[0] + e[1] + e[2]) / 3;
+    for (int i = 0; i < 3; i++) e[i] -= mean;
+    return 2 * (double)m->mu * sqrt(1.5 * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]));
+}
+/* A = sum_k value_k q_k (x) q_k. */
+static void tlsphi_compose(const double Q[9], const double value[3], tlsph_real A[9]) {
+    for (int i = 0; i < 9; i++) {
+        const double *row = Q + i / 3 * 3, *other = Q + i % 3 * 3;
+        A[i] = (tlsph_real)(value[0] * row[0] * other[0] + value[1] * row[1] * other[1] + value[2] * row[2] * other[2]);
+    }
+}
+
+/* The elastic response. Bound of the acoustic tensor: with the current normal n = F^-T N, m the direction of motion and
+   c = m.n/|n|, the form is |n|^2 [(kappa (1 - ln J) - beta (theta_R - theta)) c^2 + 2 mu f (1/2 + c^2/6) + g]. Here
+   f = x coth x <= 1 + x^2/3, x <= tau/(sqrt 3 mu) the largest difference of the elastic log strains, is what finite
+   strains add to the moduli, and g <= 4/3 tau what the stress itself does; |n|^2 is at most L_H/J^2. */
+static void tlsphi_respond_von_mises(const tlsphi_material *m, const tlsph_real *F, tlsph_real d, tlsph_real J,
+                                     int coupled, const tlsphi_plastic *plastic, tlsph_response *out) {
+    double Q[9], e[3], stress[3];
+    tlsph_real tensor[9], H[9];
+    const tlsph_real tau = (tlsph_real)tlsphi_elastic_strains(m, F, plastic->C, Q, e);
+    const tlsph_real log_J = tlsphi_log(J), pull = m->beta * m->theta_R;
+    for (int k = 0; k < 3; k++) stress[k] = 2 * (double)(m->mu / d) * e[k];
+    tlsphi_compose(Q, stress, tensor);
+    tlsph_cofactor(F, H);
+    tlsphi_product(3, tensor, H, out->e_F); /* tau' F^-T */
+    memset(out->eta_F, 0, sizeof out->eta_F);
+    out->energy = tau * tau / (6 * m->mu) + log_J * (m->kappa * log_J / 2 + pull);
+    out->entropy = m->beta * log_J;
+    out->e_J = (m->kappa * log_J + pull) / J;
+    out->eta_J = m->beta / J;
+    const tlsph_real L = tlsphi_principal_bounds(tlsphi_dot(9, F, F), tlsphi_dot(9, H, H), d).LH, dd = L / (d * d);
+    const tlsph_real shear = m->mu * (1 + tau * tau / (9 * m->mu * m->mu)), own = TLSPHI_R(4.0 / 3.0) * tau;
+    out->p_modulus[0] = (tlsphi_max(m->kappa * (1 - log_J), 0) - pull) * L / (J * J) +
+                        (TLSPHI_R(4.0 / 3.0) * shear + own) * dd;
+    out->p_modulus[1] = m->beta * (1 + (coupled && m->beta != 0 ? m->beta / m->c_v : 0)) * L / (J * J);
+    out->s_modulus[0] = (shear + own) * dd;
+    out->s_modulus[1] = 0;
+}
+
+/* Lets C_p^-1 and the plastic strain flow until F is admissible. Returns 1 if it had to. */
+static int tlsphi_return_map(const tlsphi_material *m, const tlsph_real *F, tlsph_real d, tlsphi_plastic *plastic) {
+    double Q[9], e[3];
+    const double tau = tlsphi_elastic_strains(m, F, plastic->C, Q, e);
+    const double excess = tau - (double)(m->yield + m->hardening * plastic->strain);
+    if (!(excess > 0) || !(tau < TLSPHI_LARGEST)) return 0;
+    const double flow = excess / (3 * (double)m->mu + (double)m->hardening);
+    const double keep = 1 - 3 * (double)m->mu * flow / tau, volume = log((double)d);
+    tlsph_real b[9], H[9], Hb[9];
+    /* b of volume J: det C_p^-1 stays 1. The 1/J^2 of the two inverse F is in the exponent. */
+    for (int k = 0; k < 3; k++) e[k] = exp(2 * keep * e[k] - 4 * volume / 3);
+    tlsphi_compose(Q, e, b);
+    tlsph_cofactor(F, H);
+    for (int i = 0; i < 9; i++) Hb[i] = H[i / 3] * b[i % 3] + H[3 + i / 3] * b[3 + i % 3] + H[6 + i / 3] * b[6 + i % 3];
+    tlsphi_product(3, Hb, H, plastic->C); /* F^-1 b F^-T = H^T b H / J^2 */
+    plastic->strain += (tlsph_real)flow;
+    return 1;
+}
+
+/* In the state: the different entries of C_p^-1 (plane strain: four), plastic strain, in thermal scenes the entropy. */
+static size_t tlsphi_plastic_reals(int dim, int thermal) { return (dim == 3 ? 7u : 5u) + (thermal ? 1u : 0u); }
+static void tlsphi_load_plastic(int dim, int thermal, const tlsph_real *at, tlsphi_plastic *out) {
+    const int entries = dim == 3 ? 6 : 4;
+    static const int slot[6] = {0, 4, 8, 1, 2, 5}, mirrored[6] = {0, 4, 8, 3, 6, 7};
+    *out = tlsphi_virgin;
+    for (int k = 0; k < entries; k++) out->C[slot[k]] = out->C[mirrored[k]] = at[k];
+    out->strain = at[entries];
+    if (thermal) out->entropy = at[entries + 1];
+}
+static void tlsphi_store_plastic(int dim, int thermal, const tlsphi_plastic *plastic, tlsph_real *at) {
+    const int entries = dim == 3 ? 6 : 4;
+    static const int slot[6] = {0, 4, 8, 1, 2, 5};
+    for (int k = 0; k < entries; k++) at[k] = plastic->C[slot[k]];
+    at[entries] = plastic->strain;
+    if (thermal) at[entries + 1] = plastic->entropy;
+}
+
 /* The first constant out of range, or NULL. */
 static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, double *value, const char **allowed) {
     const struct {
@@ -1977,6 +2113,10 @@ static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, d
         {"mooney_fraction", m->mooney_fraction, 0, 1, 0, 0, "0 to 1"},
         {"specific_heat", m->specific_heat, 0, TLSPHI_LARGEST, thermal, 1,
          "more than 0 in thermal scenes, else 0 or more"},
+        {"yield_stress", m->yield_stress, 0, TLSPHI_LARGEST, m->kind == TLSPH_VON_MISES, 1,
+         "more than 0 for TLSPH_VON_MISES"},
+        {"hardening", m->hardening, 0, TLSPHI_LARGEST, 0, 1, "0 or more"},
+        {"plastic_heat", m->plastic_heat, 0, 1, 0, 0, "0 to 1"},
     };
     for (size_t i = 0; i < sizeof range / sizeof range[0]; i++) {
         const double v = (double)range[i].value;
@@ -2018,6 +2158,8 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
     if (m.kind == TLSPH_USER) {
         const uint32_t particle = 0;
         m.response(m.user, 1, &particle, F, &d, &r);
+    } else if (m.kind == TLSPH_VON_MISES) {
+        tlsphi_respond_von_mises(&m, F, d, d, coupled, &tlsphi_virgin, &r);
     } else {
         tlsphi_respond(&m, F, H, d, d, coupled, &r, &dev);
     }
@@ -2026,7 +2168,7 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
     for (int i = 0; i < 9; i++) {
         const tlsph_real S = r.e_F[i] - theta * r.eta_F[i];
         out->P[i] = S + p * H[i];
-        out->Sigma_F[i] = m.kind == TLSPH_USER || linear ? S : weight * dev.a * F[i];
+        out->Sigma_F[i] = tlsphi_has_invariants(m.kind) ? weight * dev.a * F[i] : S;
         out->Sigma_H[i] = weight * dev.b * H[i];
     }
     out->Sigma_J = p + weight * dev.c;
@@ -2050,6 +2192,7 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
 typedef struct tlsphi_state {
     tlsph_real *x, *p, *F; /* D, D, DD */
     tlsph_real *H, *J, *E; /* DD, 1, 1 (E or eta); optional */
+    tlsph_real *plastic;   /* tlsphi_plastic_reals; optional */
 } tlsphi_state;
 
 enum {
@@ -2093,6 +2236,7 @@ typedef struct tlsphi_load {
 typedef struct tlsphi_account {
     double dissipation, dissipation_entropy, conduction_entropy, external_work, external_heat, external_entropy;
     double projection_work, contact_loss, impulse[3], angular_impulse[3], least_pair_production;
+    double initial_plastic_work, initial_plastic_entropy;
     double initial_energy, initial_entropy, initial_momentum[3], initial_angular[3];
 } tlsphi_account;
 
@@ -2107,7 +2251,7 @@ typedef struct tlsphi_body {
 } tlsphi_body;
 
 struct tlsph_solver {
-    int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user;
+    int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user, has_plastic;
     int audit, projection, dissipation_heats, threads, bonds;
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
     tlsph_integrator integrator;
@@ -2220,6 +2364,7 @@ typedef struct tlsphi_point {
     tlsph_real F[9], H[9], d, J; /* d = det F (linear: 1 + tr eps) */
     tlsph_response r;            /* with W inside */
     tlsphi_deviator dev;
+    tlsphi_plastic plastic;
     tlsph_real kinetic, theta, p, P[9], Sigma_J, c_p, c_s, drift_ratio;
 } tlsphi_point;
 
@@ -2254,7 +2399,8 @@ static tlsph_real tlsphi_add_drift(const tlsph_solver *s, const tlsphi_material 
 static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a,
                                      const tlsphi_point *pt) {
     if (s->thermal == TLSPH_ENERGY) return m->theta_R + (u->E[a] - pt->kinetic - pt->r.energy) / m->c_v;
-    if (s->thermal == TLSPH_ENTROPY) return m->theta_R * tlsphi_exp((u->E[a] - pt->r.entropy) / m->c_v);
+    if (s->thermal == TLSPH_ENTROPY)
+        return m->theta_R * tlsphi_exp((u->E[a] + pt->plastic.entropy - pt->r.entropy) / m->c_v);
     return m->theta_R;
 }
 
@@ -2265,11 +2411,18 @@ static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state 
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const int dim = s->dim, joint = s->coupling == TLSPH_JOINT_AS_PRINTED;
     tlsphi_load_measures(s, u, m, a, pt);
+    pt->plastic.strain = pt->plastic.entropy = 0;
     if (!tlsphi_finite(pt->d) || !tlsphi_finite(pt->J)) return TLSPH_ERROR_NOT_FINITE;
     if (m->kind != TLSPH_LINEAR && (!(pt->d > 0) || !(pt->J > 0))) return TLSPH_ERROR_INVERSION;
     if (m->kind == TLSPH_USER) {
         if (user) pt->r = *user;
         else m->response(m->user, 1, s->host + a, pt->F, &pt->J, &pt->r);
+        memset(&pt->dev, 0, sizeof pt->dev);
+    } else if (m->kind == TLSPH_VON_MISES) {
+        const size_t reals = tlsphi_plastic_reals(dim, s->thermal);
+        tlsphi_load_plastic(dim, s->thermal, u->plastic + reals * a, &pt->plastic);
+        tlsphi_respond_von_mises(m, pt->F, pt->d, pt->J, s->thermal, &pt->plastic, &pt->r);
+        if (s->thermal) pt->r.energy += (1 - m->heating) * tlsphi_plastic_work(m, pt->plastic.strain);
         memset(&pt->dev, 0, sizeof pt->dev);
     } else if (s->has_H && !joint && m->gamma != 0) {
         tlsph_real H[9]; /* the deviatoric part sees the true cofactor */
@@ -2379,6 +2532,39 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     if (s->S) s->S[a] = pt->Sigma_J;
     if (s->theta) s->theta[a] = pt->theta;
     if (s->h_J) s->h_J[a] = m->h / pt->J;
+}
+
+/* Plastic flow of one particle since the beginning of the step. Returns 1 if there was any. */
+static int tlsphi_flow(tlsph_solver *s, size_t a) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    const size_t reals = tlsphi_plastic_reals(s->dim, s->thermal);
+    tlsphi_plastic plastic;
+    tlsph_real F[9];
+    if (m->kind != TLSPH_VON_MISES) return 0;
+    tlsphi_expand(s->dim, s->now.F + (size_t)(s->dim * s->dim) * a, 1, F);
+    tlsphi_load_plastic(s->dim, s->thermal, s->old.plastic + reals * a, &plastic);
+    const tlsph_real d = tlsph_determinant(F);
+    const int flows = d > 0 && tlsphi_finite(d) && tlsphi_return_map(m, F, d, &plastic);
+    tlsphi_store_plastic(s->dim, s->thermal, &plastic, s->now.plastic + reals * a);
+    return flows;
+}
+/* Entropy of the plastic heat. In the energy form E has given the heat already: theta is that after it. */
+static void tlsphi_heat_of_flow(tlsph_solver *s, size_t a) {
+    const tlsphi_material *m = tlsphi_material_of(s, a);
+    const size_t reals = tlsphi_plastic_reals(s->dim, s->thermal);
+    tlsphi_plastic old;
+    tlsphi_point pt;
+    if (tlsphi_constitute(s, &s->now, a, NULL, &pt)) return; /* the evaluation that follows reports it */
+    tlsphi_load_plastic(s->dim, s->thermal, s->old.plastic + reals * a, &old);
+    const tlsph_real heat =
+        m->heating * (tlsphi_plastic_work(m, pt.plastic.strain) - tlsphi_plastic_work(m, old.strain));
+    const tlsph_real before = s->thermal == TLSPH_ENTROPY ? pt.theta : pt.theta - heat / m->c_v;
+    if (before > 0) pt.plastic.entropy = old.entropy + m->c_v * tlsphi_log(1 + heat / (m->c_v * before));
+    tlsphi_store_plastic(s->dim, s->thermal, &pt.plastic, s->now.plastic + reals * a);
+}
+static void tlsphi_flow_block(tlsph_solver *s, tlsphi_block *block) {
+    for (size_t a = block->begin; a < block->end; a++)
+        if (tlsphi_flow(s, a) && s->thermal) tlsphi_heat_of_flow(s, a);
 }
 
 static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
@@ -3317,7 +3503,7 @@ static int tlsphi_set_temperature(tlsph_solver *s, size_t a, tlsph_real theta) {
     tlsphi_point pt;
     if (tlsphi_respond_at(s, &s->now, a, NULL, &pt)) return 0;
     if (s->thermal == TLSPH_ENERGY) s->now.E[a] = pt.kinetic + pt.r.energy + m->c_v * (theta - m->theta_R);
-    else s->now.E[a] = pt.r.entropy + m->c_v * tlsphi_log(theta / m->theta_R);
+    else s->now.E[a] = pt.r.entropy + m->c_v * tlsphi_log(theta / m->theta_R) - pt.plastic.entropy;
     return 1;
 }
 static void tlsphi_hold_temperature(tlsph_solver *s, tlsphi_load *load, double weight, double time) {
@@ -3765,6 +3951,7 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
         s->damps = k == 0 || !s->frozen;
         tlsphi_right_hand_side(s, stage, dt);         /* (4) rates, (5) projection            */
         tlsphi_evolve(s, stage, dt);                  /* (6) u = a u_old + b u + c dt L       */
+        if (s->now.plastic) tlsphi_run(s, tlsphi_flow_block);
         tlsphi_impose(s, stage, dt);                  /* (7) constraints                      */
         const tlsphi_block *bad = tlsphi_evaluate(s); /* (8) stress, (9) temperature          */
         if (bad) {
@@ -3835,6 +4022,8 @@ static void tlsphi_ledger_particle(const tlsph_solver *s, size_t a, tlsph_ledger
         out->centre[i] += V * (double)m->rho * x[i];
     }
     out->kinetic_energy += V * (double)pt.kinetic;
+    out->plastic_work += V * (double)tlsphi_plastic_work(m, pt.plastic.strain);
+    out->plastic_entropy += V * (double)pt.plastic.entropy;
     if (s->thermal) {
         const double theta = (double)pt.theta, theta_R = (double)m->theta_R, c_v = (double)m->c_v;
         const double eta = (double)pt.r.entropy + c_v * log(theta / theta_R);
@@ -3869,9 +4058,11 @@ static void tlsphi_ledger_accounts(const tlsph_solver *s, tlsph_ledger *out) {
     }
     const int keeps_heat = s->thermal == TLSPH_ENERGY || (s->thermal == TLSPH_ENTROPY && s->dissipation_heats);
     out->energy_residual = out->total_energy - c->initial_energy - c->external_work - c->external_heat +
-                           (keeps_heat ? 0 : c->dissipation) + (s->thermal == TLSPH_ENERGY ? 0 : c->contact_loss);
+                           (keeps_heat ? 0 : c->dissipation) + (s->thermal == TLSPH_ENERGY ? 0 : c->contact_loss) +
+                           (s->thermal ? 0 : out->plastic_work - c->initial_plastic_work);
     out->entropy_residual = out->entropy - c->initial_entropy - c->conduction_entropy - c->external_entropy -
-                            (keeps_heat ? c->dissipation_entropy : 0);
+                            (keeps_heat ? c->dissipation_entropy : 0) -
+                            (out->plastic_entropy - c->initial_plastic_entropy);
 }
 TLSPHI_DEF void tlsph_ledger_read(const tlsph_solver *s, tlsph_ledger *out) {
     memset(out, 0, sizeof *out);
@@ -3891,6 +4082,8 @@ TLSPHI_DEF void tlsph_ledger_reset(tlsph_solver *s) {
     tlsph_ledger_read(s, &now);
     s->account.initial_energy = now.total_energy;
     s->account.initial_entropy = now.entropy;
+    s->account.initial_plastic_work = now.plastic_work;
+    s->account.initial_plastic_entropy = now.plastic_entropy;
     s->account.least_pair_production = TLSPHI_LARGEST;
     for (int i = 0; i < 3; i++) {
         s->account.initial_momentum[i] = now.linear_momentum[i];
@@ -3994,10 +4187,11 @@ static void tlsphi_read_derived(const tlsph_solver *s, size_t a, tlsph_field fie
     case TLSPH_FIELD_STRESS: memcpy(out, pt.P, sizeof pt.P); break;
     case TLSPH_FIELD_PRESSURE: *out = tlsphi_dot(9, pt.P, pt.F) / (3 * volume); break;
     case TLSPH_FIELD_VON_MISES: *out = tlsphi_von_mises(&pt, volume); break;
+    case TLSPH_FIELD_PLASTIC_STRAIN: *out = pt.plastic.strain; break;
     case TLSPH_FIELD_SIGMA_F:
         for (int i = 0; i < 9; i++)
-            out[i] = m->kind == TLSPH_USER || m->kind == TLSPH_LINEAR ? pt.r.e_F[i] - pt.theta * pt.r.eta_F[i]
-                                                                      : weight * pt.dev.a * pt.F[i];
+            out[i] = tlsphi_has_invariants(m->kind) ? weight * pt.dev.a * pt.F[i]
+                                                    : pt.r.e_F[i] - pt.theta * pt.r.eta_F[i];
         break;
     case TLSPH_FIELD_SIGMA_H:
         for (int i = 0; i < 9; i++) out[i] = weight * pt.dev.b * pt.H[i];
@@ -4012,6 +4206,7 @@ static void tlsphi_read_derived(const tlsph_solver *s, size_t a, tlsph_field fie
 }
 static int tlsphi_field_exists(const tlsph_solver *s, tlsph_field field) {
     if ((unsigned)field >= (unsigned)TLSPH_FIELD_COUNT) return 0;
+    if (field == TLSPH_FIELD_PLASTIC_STRAIN && !s->now.plastic) return 0;
     return s->thermal ||
            (field != TLSPH_FIELD_TEMPERATURE && field != TLSPH_FIELD_ENERGY && field != TLSPH_FIELD_ENTROPY);
 }
@@ -4082,6 +4277,7 @@ TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tl
     tlsphi_keep_state(s);
     for (size_t a = 0; a < s->n; a++) tlsphi_write_particle(s, a, field, in + components * s->host[a]);
     if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s);
+    for (size_t a = 0; s->now.plastic && field == TLSPH_FIELD_F && a < s->n; a++) tlsphi_flow(s, a);
     for (size_t a = 0; s->thermal && a < s->n; a++)
         tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : s->theta[a]);
     const tlsphi_block *bad = tlsphi_evaluate(s);
@@ -4157,12 +4353,12 @@ static tlsph_real tlsphi_get_real(const unsigned char **at) {
 }
 
 /* The state arrays with their components, in the order of the checkpoint. */
-static int tlsphi_state_arrays(const tlsph_solver *s, tlsph_real *array[6], size_t components[6]) {
+static int tlsphi_state_arrays(const tlsph_solver *s, tlsph_real *array[7], size_t components[7]) {
     const size_t D = (size_t)s->dim;
-    tlsph_real *const all[6] = {s->now.x, s->now.p, s->now.F, s->now.H, s->now.J, s->now.E};
-    const size_t sizes[6] = {D, D, D * D, D * D, 1, 1};
+    tlsph_real *const all[7] = {s->now.x, s->now.p, s->now.F, s->now.H, s->now.J, s->now.E, s->now.plastic};
+    const size_t sizes[7] = {D, D, D * D, D * D, 1, 1, tlsphi_plastic_reals(s->dim, s->thermal)};
     int count = 0;
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 7; i++) {
         if (!all[i]) continue;
         array[count] = all[i];
         components[count++] = sizes[i];
@@ -4174,8 +4370,8 @@ TLSPHI_DEF size_t tlsph_save_size(const tlsph_solver *s) {
 }
 TLSPHI_DEF tlsph_result tlsph_save(const tlsph_solver *s, void *buffer, size_t size) {
     unsigned char *at = (unsigned char *)buffer;
-    tlsph_real *array[6];
-    size_t components[6];
+    tlsph_real *array[7];
+    size_t components[7];
     double accounts[TLSPHI_ACCOUNTS];
     if (!buffer) return TLSPH_ERROR_ARGUMENT;
     if (size < tlsph_save_size(s)) return TLSPH_ERROR_SIZE;
@@ -4215,8 +4411,8 @@ static tlsph_result tlsphi_check_checkpoint(tlsph_solver *s, const unsigned char
 }
 TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_t size) {
     const unsigned char *at = (const unsigned char *)buffer;
-    tlsph_real *array[6];
-    size_t components[6];
+    tlsph_real *array[7];
+    size_t components[7];
     double accounts[TLSPHI_ACCOUNTS];
     if (!buffer)
         return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "restore", "buffer", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
@@ -4538,13 +4734,15 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->linear &= d->materials[i].kind == TLSPH_LINEAR;
         s->conducts |= s->thermal && d->materials[i].conductivity > 0;
         s->has_user |= d->materials[i].kind == TLSPH_USER;
+        s->has_plastic |= d->materials[i].kind == TLSPH_VON_MISES;
     }
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
 }
 
 static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
     const size_t D = (size_t)s->dim, n = s->n;
-    s->state_reals = n * (2 * D + D * D + (s->has_H ? D * D : 0) + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0));
+    s->state_reals = n * (2 * D + D * D + (s->has_H ? D * D : 0) + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0) +
+                          (s->has_plastic ? tlsphi_plastic_reals(s->dim, s->thermal) : 0));
     s->now_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
     s->old_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
     if (!arena->memory || arena->overflow) return;
@@ -4566,7 +4764,11 @@ static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
             u->J = at;
             at += n;
         }
-        if (s->thermal) u->E = at;
+        if (s->thermal) {
+            u->E = at;
+            at += n;
+        }
+        if (s->has_plastic) u->plastic = at;
     }
 }
 static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
@@ -4691,6 +4893,9 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
             if (s->has_H) s->now.H[D * D * a + (D + 1) * i] = 1;
         }
         if (s->has_J) s->now.J[a] = 1;
+        if (s->now.plastic)
+            tlsphi_store_plastic(s->dim, s->thermal, &tlsphi_virgin,
+                                 s->now.plastic + tlsphi_plastic_reals(s->dim, s->thermal) * a);
     }
     for (size_t a = 0; s->M && a < s->n; a++)
         for (size_t i = 0; i < D * D; i++)
@@ -4870,9 +5075,10 @@ static uint64_t tlsphi_fingerprint(const tlsph_solver *s) {
     }
     for (size_t i = 0; i < s->material_count; i++) {
         const tlsphi_material *m = s->materials + i;
-        const tlsph_real constants[9] = {m->rho, m->c_v, m->theta_R, m->h, m->zeta, m->gamma, m->k, m->beta, m->q};
+        const tlsph_real constants[12] = {m->rho, m->c_v,  m->theta_R, m->h,     m->zeta,      m->gamma,
+                                          m->k,   m->beta, m->q,       m->yield, m->hardening, m->heating};
         const unsigned char kind = (unsigned char)m->kind;
-        h = tlsphi_hash_reals(tlsphi_hash(h, &kind, 1), constants, 9);
+        h = tlsphi_hash_reals(tlsphi_hash(h, &kind, 1), constants, 12);
     }
     return h;
 }

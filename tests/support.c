@@ -160,6 +160,11 @@ tlsph_material soft_material(tlsph_material_kind kind)
     m.specific_heat = 1;
     m.conductivity = 10;
     m.reference_temperature = R(293.15);
+    if (kind == TLSPH_VON_MISES) {
+        m.yield_stress = 200;
+        m.hardening = 2000;
+        m.plastic_heat = R(0.9);
+    }
     return m;
 }
 
