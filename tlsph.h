@@ -2490,12 +2490,14 @@ static const tlsphi_mirror *tlsphi_mirrors_of(const tlsph_solver *s, size_t a) {
     return s->mirror_of && s->mirror_of[a] != TLSPHI_NONE ? s->mirror + s->mirror_of[a] : NULL;
 }
 
+#define TLSPHI_SHARP_STEP 1.5 /* by which sharp gradients shorten tau: 1.37 times the largest frequency, and a margin */
+
 /* Largest stable step of one particle, s: (78) with the current isentropic speed, and the diffusive limit. */
 static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
-    const double tau = (double)s->tau[a];
-    double dt = TLSPHI_LARGEST;
+    double tau = (double)s->tau[a], dt = TLSPHI_LARGEST;
     if (pt->c_p > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE) dt = (double)s->cfl * tau / (double)pt->c_p;
+    if (s->sharp) tau *= TLSPHI_SHARP_STEP; /* sharp gradients are for v only: heat keeps its stencil */
     if (s->conducts && m->h > 0) {
         tlsph_real HtH[9];
         for (int i = 0; i < 3; i++)
@@ -2888,7 +2890,6 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
    instead of 2 s^3: r = 3/2 would leave fifth order, but the two-stage scheme amplifies waves by (omega dt)^4/8 a step,
    which a little of the third order must outweigh, diagonal waves in 3-D included: 1 - 2 r/3 > 6 nu^3 with nu the Courant
    number over TLSPHI_SHARP_STEP. At CFL 0.3 that is 0.067 > 0.048. */
-#define TLSPHI_SHARP_STEP 1.5 /* shortens the time step: 1.37 and a margin */
 #define TLSPHI_SHARP_REACH 1.4 /* r */
 
 /* correction: sum_b ((g_b - g_a) d) (x) C_ab;  moment: sum_b ((P_a - P_b) C_ab) (x) d */

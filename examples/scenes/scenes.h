@@ -347,5 +347,61 @@ void rotating_disk_default(rotating_disk_parameters *parameters);
 tlsph_result rotating_disk_create(const rotating_disk_parameters *parameters, rotating_disk *out, tlsph_error *error);
 /* Exact heat that has entered by time t, J. */
 double rotating_disk_heat(const rotating_disk_parameters *parameters, double t);
+/* ---- Danilovskaya's problems: 003 sections 9.2 and 9.3, METHOD section 9 ------------------------------------------ */
+
+/* Half space y >= 0, free at y = 0 and heated there: suddenly to 1; by the flux m (1 - theta); to 1 in a ramp. */
+typedef enum danilovskaya_problem {
+    DANILOVSKAYA_FIRST, DANILOVSKAYA_SECOND, STERNBERG_CHAKRAVORTY
+} danilovskaya_problem;
+
+#define DANILOVSKAYA_TRANSFER 0.5  /* m of 003 (89) */
+#define DANILOVSKAYA_RAMP 0.25     /* length of the ramp, 003 (91) */
+
+/* Dimensionless as in 003 (11), but with the applied temperature as unit instead of T0. */
+typedef struct danilovskaya_state { double theta, u, sigma; } danilovskaya_state;
+
+/* Exact values at y >= 0 and t, any delta >= 0; at the front y = t the mean of both sides. */
+danilovskaya_state danilovskaya_exact(danilovskaya_problem problem, double delta, double y, double t);
+/* First problem without inertia. */
+danilovskaya_state danilovskaya_quasi_static(double delta, double y, double t);
+
+typedef struct danilovskaya_parameters {
+    scene_options options;  /* end_time is not used: see danilovskaya_advance */
+    int problem;            /* a danilovskaya_problem */
+    double delta;           /* coupling; the solver uses at least 1e-6 */
+    double spacing, length; /* in units of a = kappa/c_s */
+    int across, dimension;  /* spacings across the bar; 2 or 3 */
+    double load;            /* delta times the applied temperature over T0, which is 0.1 at most: small, because only
+                               then the equations are linear; not too small, because strains lose digits in x */
+    double rise;            /* first problem: the jump is spread over the time of a wave for so many spacings, with its
+                               middle at t = 0; what is shorter than a spacing would only ring behind the front */
+    int material;           /* TLSPH_LINEAR or TLSPH_MIE_GRUNEISEN */
+} danilovskaya_parameters;
+
+typedef struct danilovskaya {
+    scene_body body;
+    danilovskaya_parameters parameters;
+    double length_unit, time_unit, theta_unit, stress_unit, u_unit, flux_unit; /* m, s, K, Pa, m, W/m^2 */
+    double T0;              /* K */
+    size_t sections;        /* particles along the bar */
+    size_t *line;           /* their numbers on one edge, in order of y */
+    double start, ramp;     /* t at the solver's time 0; length of the rise of the temperature */
+    double surface;         /* theta at y = 0 at the beginning of the step: the second problem's flux needs it */
+} danilovskaya;
+
+void danilovskaya_default(danilovskaya_parameters *parameters);
+tlsph_result danilovskaya_create(const danilovskaya_parameters *parameters, danilovskaya *out, tlsph_error *error);
+/* Steps until t (dimensionless). */
+tlsph_result danilovskaya_advance(danilovskaya *bar, double t);
+double danilovskaya_time(const danilovskaya *bar); /* dimensionless */
+/* y and the state along the bar now, `sections` values each. 0 on success. */
+int danilovskaya_profile(const danilovskaya *bar, double *y, danilovskaya_state *state);
+/* Linear interpolation in a profile. */
+danilovskaya_state danilovskaya_at(size_t count, const double *y, const danilovskaya_state *state, double where);
+/* Relative L2 errors now (exact: with the delta asked for), and how far sigma leaves the exact range within 0.5 of the
+   front, as a share of the front's jump exp(-delta t/2) (0 where the problem has no jump). */
+typedef struct danilovskaya_errors { double theta, u, sigma, overshoot; } danilovskaya_errors;
+int danilovskaya_compare(const danilovskaya *bar, danilovskaya_errors *errors);
+void danilovskaya_destroy(danilovskaya *bar);
 
 #endif
