@@ -2258,7 +2258,7 @@ struct tlsph_solver {
     tlsph_dissipation dissipation;
     tlsph_force_form force_form;
     tlsph_step_rule step_rule;
-    double harmonic, biharmonic; /* eta2 h and eta4 h^3 */
+    double harmonic, biharmonic, jst_step; /* eta2 h, eta4 h^3, and the step that these allow */
     tlsph_volume_coupling coupling;
     tlsph_conduction conduction;
     tlsph_real drift_stiffness, drift_scale, jump_share, drift_relaxation, cfl;
@@ -2949,7 +2949,10 @@ static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
    usual difference. The second term of L_ab takes away what a linear field would give beside a face (no Laplacian from the
    neighbours there can be right for all quadratic fields: at a corner it would be 0/0). The harmonic part of each pair
    dissipates; the biharmonic part is the square of the Laplacian inside the body and has no sign pair by pair. v is the
-   velocity without rigid motion, as in [DISSIPATION]; each side of a pair takes half of its work as heat. */
+   velocity without rigid motion, as in [DISSIPATION]; each side of a pair takes half of its work as heat. The time step by
+   particles is kept below what this dissipation allows (with wide supports h^3 makes it stiff); the paper's is not. */
+
+#define TLSPHI_JST_STEP 1.8 /* over the bound of the fastest decay: two stages allow 2 over the decay itself */
 
 static tlsph_real tlsphi_pair_laplacian(const tlsph_solver *s, size_t a, size_t b, size_t k) {
     const int dim = s->dim;
@@ -3911,7 +3914,7 @@ static void tlsphi_restore_state(tlsph_solver *s) {
 }
 
 TLSPHI_DEF tlsph_real tlsph_stable_time_step(const tlsph_solver *s) {
-    double dt = TLSPHI_LARGEST;
+    double dt = s->jst_step;
     for (size_t i = 0; i < s->blocks; i++) dt = tlsphi_dmin(dt, s->block[i].time_step);
 #ifdef TLSPH_REAL_FLOAT
     dt = tlsphi_dmin(dt, 3e38);
@@ -4947,19 +4950,25 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
                                  (s->sharp ? TLSPHI_SHARP_STEP : 1));
     }
 }
+/* l_ab, what corrects it, and the step that the dissipation allows by Gershgorin's bound 2 sum_b l_ab / V_a. */
 static void tlsphi_fill_laplacian(tlsph_solver *s) {
     const size_t D = (size_t)s->dim;
+    double fastest = 0;
     for (size_t a = 0; s->laplacian && a < s->n; a++)
         for (size_t k = s->first[a]; k < s->first[a + 1]; k++)
             s->laplacian[k] = tlsphi_pair_laplacian(s, a, s->neighbour[k], k);
     for (size_t a = 0; s->laplacian && a < s->n; a++) {
-        tlsph_real lean[3], turned[3];
+        tlsph_real lean[3], turned[3], sum = 0;
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) sum += s->laplacian[k];
+        const double bound = 2 * (double)(sum / s->V[a]), c = (double)tlsphi_material_of(s, a)->c_linear;
+        fastest = tlsphi_dmax(fastest, c * bound * (s->harmonic + s->biharmonic * bound));
         tlsphi_laplacian_lean(s, a, lean, turned);
         for (size_t i = 0; i < D; i++) {
             s->lean[2 * D * a + i] = turned[i];
             s->lean[2 * D * a + D + i] = lean[i];
         }
     }
+    s->jst_step = fastest > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE ? TLSPHI_JST_STEP / fastest : TLSPHI_LARGEST;
 }
 static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
     const size_t D = (size_t)s->dim;

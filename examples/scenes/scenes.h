@@ -404,4 +404,87 @@ typedef struct danilovskaya_errors { double theta, u, sigma, overshoot; } danilo
 int danilovskaya_compare(const danilovskaya *bar, danilovskaya_errors *errors);
 void danilovskaya_destroy(danilovskaya *bar);
 
+/* ---- derivatives in one dimension: 002 section 4.1, figures 4 to 6 ------------------------------------------------ */
+
+typedef enum gradient_form {
+    GRADIENT_STANDARD,     /* (33) with the gradient of the first-order kernel */
+    GRADIENT_BOND_ONLY,    /* (34) with (35): no bond of a particle with itself */
+    GRADIENT_BOND_FIRST,   /* (34) with (36) and the first-order kernel */
+    GRADIENT_BOND_ZEROTH,  /* the same with the zeroth-order kernel and its corrected gradient */
+    GRADIENT_FORMS
+} gradient_form;
+typedef struct gradient_field { double (*value)(double X), (*slope)(double X); } gradient_field;
+
+/* Derivative of field at n particles X_i = (i + 1/2) length/n, cubic spline of half-width `radius` (m). out: n. */
+void gradient_study_derivative(gradient_form form, const gradient_field *field, double length, int n, double radius,
+                               double *out);
+/* Root mean square error of it. */
+double gradient_study_error(gradient_form form, const gradient_field *field, double length, int n, double radius);
+
+/* ---- swinging plate, plane strain: 002 section 5.1, swinging_plate_t0.002_*.csv ----------------------------------- */
+
+/* [0,2]^2 with rollers on all four sides: u = U sin(w t) {-sin(pi X/2) cos(pi Y/2), cos(pi X/2) sin(pi Y/2)}. The mode has
+   no divergence, so that only the shear speed enters: w = (pi/2) sqrt(2 mu/rho). */
+typedef struct swinging_plate_parameters {
+    scene_options options;
+    int n;                /* spacings a side of 2 m */
+    double amplitude;     /* U, m */
+    double young, poisson, density;
+    int linear;           /* 1: linear material, for which the solution is exact; 0: neo-Hookean */
+} swinging_plate_parameters;
+
+typedef struct swinging_plate {
+    scene_body body;
+    swinging_plate_parameters parameters;
+    double omega, shear;  /* rad/s, Pa */
+} swinging_plate;
+
+/* Errors of the displacement and its gradient: integrals over the plate by their exact values. */
+/* Six doubles in this order. */
+typedef struct plate_errors {
+    double L2, H1;               /* of the kernels' interpolation, by 10 x 10 tiles of 5 x 5 Gauss points (002-44, 45) */
+    double L2_particles, H1_particles; /* sums over the particles, of u and F */
+    double velocity, stress;     /* the same of v and P */
+} plate_errors;
+
+void swinging_plate_default(swinging_plate_parameters *parameters);
+tlsph_result swinging_plate_create(const swinging_plate_parameters *parameters, swinging_plate *out, tlsph_error *error);
+void swinging_plate_exact(const swinging_plate *plate, const tlsph_real X[3], double t, double u[3], double v[3],
+                          double F[9], double P[9]);
+/* integrals 0: without L2 and H1, which cost as much as some steps. */
+void swinging_plate_errors(const swinging_plate *plate, int integrals, plate_errors *errors);
+
+/* ---- spinning plate and cube: 002 section 5.2 ---------------------------------------------------------------------- */
+
+/* A free square or cube of 1 m that turns about Z through its middle. */
+typedef struct spinning_box_parameters {
+    scene_options options;
+    int dimension, n;     /* particles a side, at the centres of cells */
+    double spin;          /* rad/s */
+    double young, poisson, density;
+} spinning_box_parameters;
+
+typedef struct spinning_box { scene_body body; spinning_box_parameters parameters; } spinning_box;
+
+void spinning_box_default(spinning_box_parameters *parameters, int dimension);
+tlsph_result spinning_box_create(const spinning_box_parameters *parameters, spinning_box *out, tlsph_error *error);
+
+/* ---- bending column: 002 section 5.3 ------------------------------------------------------------------------------- */
+
+/* 1 m x 1 m x 6 m, fixed at Z = 0, v = (0, 5 Z/3, 0) m/s at t = 0. */
+typedef struct bending_column_parameters {
+    scene_options options;
+    int n;                /* spacings across 1 m */
+    int centred;          /* 1: particles at the centres of cells, as 5 x 5 x 30 in 002; 0: on the faces */
+    double speed;         /* of the tip, m/s */
+    double young, poisson, density;
+} bending_column_parameters;
+
+typedef struct bending_column { scene_body body; bending_column_parameters parameters; size_t tip; } bending_column;
+
+void bending_column_default(bending_column_parameters *parameters);
+tlsph_result bending_column_create(const bending_column_parameters *parameters, bending_column *out, tlsph_error *error);
+/* The setting of 002: bonds, cubic spline with support 0.9, JST, no projection, three stages. */
+void scene_options_of_002(scene_options *options, double biharmonic);
+
 #endif
