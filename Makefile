@@ -24,7 +24,7 @@ VALGRIND := $(shell command -v valgrind 2> /dev/null)
 EXAMPLES := $(patsubst examples/%.c,build/%,$(wildcard examples/*.c))
 # One archive a flavour: the library and what examples, tests and benches share. A program takes from it what it needs.
 SHARED := $(wildcard examples/common/*.c examples/scenes/*.c) tests/implementation.c
-TESTS := $(filter-out tests/implementation.c,$(wildcard tests/*.c))
+TESTS := $(filter-out tests/implementation.c tests/fuzz.c,$(wildcard tests/*.c))
 TOPICS := $(patsubst tests/test_%.c,%,$(wildcard tests/test_*.c))
 BENCHES := $(wildcard bench/*.c)
 
@@ -76,6 +76,11 @@ build/bench: $(BENCHES:%.c=build/obj/double/%.o) build/obj/double/shared.a
 bench: $(if $(BENCHES),build/bench)
 	$(if $(BENCHES),build/bench --quick,@echo "no bench")
 
+# Scenes and checkpoints of random bytes; tests/fuzz.c tells how libFuzzer and AFL++ run it.
+build/fuzz: tests/fuzz.c tlsph.h
+	@mkdir -p $(@D)
+	$(CC) -std=c99 $(WARNINGS) -O1 -g $(SANITIZE) -I. $< -o $@ $(LDLIBS)
+
 # The list of test files; rewritten only when it changes.
 build/suites.h: FORCE
 	@mkdir -p build
@@ -91,9 +96,10 @@ SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
 SLOW_STEPS := "build/test_double --slow" "build/test_fast_math errors/" \
   $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
     "$(call SKIPPED,no sanitizers)") \
+  "build/fuzz 20000" \
   $(if $(VALGRIND),"valgrind -q --error-exitcode=9 --leak-check=full build/test_valgrind checkpoint/continues memory/ errors/ operators/cells fill/refusals",\
     "$(call SKIPPED,no valgrind)")
-SLOW_PROGRAMS := build/test_double build/test_fast_math $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
+SLOW_PROGRAMS := build/fuzz build/test_double build/test_fast_math $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
 
 test: build/test_double build/test_float
 	@sh tests/run.sh $(FAST_STEPS)

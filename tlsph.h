@@ -3978,9 +3978,9 @@ TLSPHI_DEF tlsph_result tlsph_step(tlsph_solver *s, tlsph_real dt_limit) {
     if (s->first_dt > 0 && stable < 1e-9 * s->first_dt)
         return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "stable dt", TLSPH_NO_PARTICLE, stable,
                            1e-9 * s->first_dt, "more than 1e-9 of the first step; wave speeds have run away");
-    if (!(s->first_dt > 0)) s->first_dt = stable;
     const tlsph_result result = tlsphi_step_by(s, dt);
     if (!result) s->time += dt;
+    if (!result && !(s->first_dt > 0)) s->first_dt = stable;
     return result;
 }
 TLSPHI_DEF tlsph_result tlsph_advance(tlsph_solver *s, tlsph_real time) {
