@@ -73,6 +73,15 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = quiet;
 }
 
+void scene_options_cloud(scene_options *options, tlsph_fill *fill) {
+    options->sharp = 0;
+    if (options->operator_kind != TLSPH_CORRECTED_KERNEL) return;
+    options->operator_kind = TLSPH_CLOSED;
+    options->kernel = TLSPH_WENDLAND_C2;
+    options->support = 0.825;
+    fill->voronoi = 1;
+}
+
 void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->unknowns = (tlsph_unknowns)options->unknowns;
     desc->thermal = (tlsph_thermal)options->thermal;

@@ -37,6 +37,8 @@ typedef struct scene_options {
 void scene_options_default(scene_options *options);
 /* Fills table[SCENE_OPTION_COUNT] with command line entries that write into *options. */
 void scene_option_table(scene_options *options, ex_option *table);
+/* Irregular clouds: the closed operator instead of the default one, with the volumes and areas that it needs. */
+void scene_options_cloud(scene_options *options, tlsph_fill *fill);
 void scene_options_apply(const scene_options *options, tlsph_desc *desc);
 
 /* ---- a body under construction ----------------------------------------------------------------------------------- */

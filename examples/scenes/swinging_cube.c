@@ -65,10 +65,7 @@ tlsph_result swinging_cube_create(const swinging_cube_parameters *p, swinging_cu
     tlsph_result result;
     memset(out, 0, sizeof *out);
     out->parameters = *p;
-    if (p->jitter > 0) { /* no lattice: six neighbours are too few, and C is not antisymmetric */
-        options.sharp = 0;
-        options.support = fmax(options.support, 0.9);
-    }
+    if (p->jitter > 0) scene_options_cloud(&options, &fill);
     scene_moduli(&material, &p_wave, &bulk, &shear);
     out->omega = sqrt(3) / 2 * SCENE_PI * sqrt(p_wave / p->density);
     fill.size[0] = fill.size[1] = fill.size[2] = 1;
