@@ -2981,7 +2981,7 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     s->wave[4 * a + 3] = pt->drift_ratio;
     if (s->S) s->S[a] = pt->Sigma_J;
     if (s->theta) s->theta[a] = pt->theta;
-    if (s->h_J) s->h_J[a] = m->h / pt->J;
+    if (s->h_J) s->h_J[a] = m->kind == TLSPH_LINEAR ? m->h : m->h / pt->J; /* linear: H = I, J = 1 in (000-13) */
 }
 
 /* Plastic flow of one particle since the beginning of the step. Returns 1 if there was any. */

@@ -489,4 +489,41 @@ tlsph_result bending_column_create(const bending_column_parameters *parameters, 
 /* The setting of 002: bonds, cubic spline with support 0.9, JST, no projection, three stages. */
 void scene_options_of_002(scene_options *options, double biharmonic);
 
+/* ---- manufactured solution: 000 section 7.1, manufactured_thermoelastic.csv --------------------------------------- */
+
+typedef struct manufactured_parameters {
+    scene_options options;
+    int n;                /* spacings a side of 1 m */
+    int centred;          /* 1: particles at cell centres, 0: on the faces */
+    int layers;           /* of particles outside the faces */
+    int driven;           /* outermost layers that move exactly: with 2, gradients are central wherever forces count. The
+                             others outside are free: where the exact motion is forced upon a scheme that errs by h^2 its
+                             error has a kink, and stresses are first order beside it */
+    double jitter;        /* share of the spacing */
+    double rate;          /* A, 1/s */
+    double heating;       /* B, 1/s */
+    tlsph_material material; /* linear, MEE or Mie-Grueneisen */
+} manufactured_parameters;
+
+typedef struct manufactured { scene_body body; manufactured_parameters parameters; } manufactured;
+
+/* All that is exact at a point: force per reference volume (N/m^3), heat source (W/m^3); energy with its kinetic part. */
+typedef struct manufactured_state {
+    double x[3], v[3], F[9], H[9], P[9], theta, entropy, energy, force[3], source;
+} manufactured_state;
+
+/* Relative L2 errors over the particles of the cube: all components together, and each; theta by theta - theta_R. */
+typedef struct manufactured_errors { double p, P, theta, p_each[3], P_each[9]; } manufactured_errors;
+
+void manufactured_default(manufactured_parameters *parameters);
+/* Material and setting: the paper's (strain 5e-4 at 0.001 s), or a demanding one (strain 0.12 at 0.25 s, in which waves
+   cross the cube twice; temperature +-36 K, conductivity 100 W/(m K)). */
+void manufactured_set(manufactured_parameters *parameters, tlsph_material_kind kind, int demanding);
+void manufactured_exact(const manufactured_parameters *parameters, const double X[3], double t, manufactured_state *out);
+tlsph_result manufactured_create(const manufactured_parameters *parameters, manufactured *out, tlsph_error *error);
+/* Runs to the options' end time; the norms are over as many equally spaced instants. `step` is called after each step with
+   `user`; it may be NULL. */
+tlsph_result manufactured_run(manufactured *cube, int instants, void (*step)(void *user), void *user,
+                              manufactured_errors *out);
+
 #endif
