@@ -175,6 +175,33 @@ TEST(loads_at_the_right_stage_times) {
 
 /* ---- stability --------------------------------------------------------------------------------------------------- */
 
+static void noise(const void *scene, const tlsph_real X[3], scene_state *state) {
+    (void)scene;
+    for (int i = 0; i < 3; i++) /* sines of large arguments: as good as random, and the same everywhere */
+        state->v[i] = 1e-3 * sin(1e3 * (double)X[i] + 2e3 * (double)X[(i + 1) % 3] + 3e3 * (double)X[(i + 2) % 3]);
+}
+
+/* Energy after 600 steps of a noisy linear body over that at the beginning. */
+static double noise_gain(int integrator, double cfl) {
+    const tlsph_material material = scene_paper_material(TLSPH_LINEAR);
+    scene_options options = physics_options(TLSPH_PF, TLSPH_ISOTHERMAL);
+    double first;
+    tlsph_ledger l;
+    scene_setup setup;
+    scene_body body;
+    options.integrator = integrator;
+    options.cfl = cfl;
+    box_begin(&setup, 4, 4, 4, &material);
+    if (scene_end(&setup, &options, &body, NULL) || scene_set_state(&body, NULL, noise)) return HUGE_VAL;
+    tlsph_ledger_read(body.solver, &l);
+    first = l.total_energy;
+    for (int i = 0; i < 600; i++)
+        if (tlsph_step(body.solver, 1)) { first = 0; break; }
+    tlsph_ledger_read(body.solver, &l);
+    scene_destroy(&body);
+    return first > 0 ? l.total_energy / first : HUGE_VAL;
+}
+
 /* Breathing of a body of two cells a side is a linear field, which the reconstruction leaves undamped: RK2 amplifies it
    at any CFL number, three stages damp it. Energy after 1500 steps over that at the beginning. */
 static double two_cells(int integrator, double cfl) {
@@ -205,6 +232,19 @@ TEST(two_cells_are_stable_with_three_stages) {
     for (int i = 1; i < 4; i++) CHECK_BELOW(gain[i], 1);
 }
 
-SUITE(physics_integrators, ENTRY(momenta_and_energy_of_every_scheme), ENTRY(linear_material_in_every_scheme),
+/* Noise in a body of four cells a side, at the limit that the library states and well beyond it (RK2: with damping of the
+   linear modes by time only, so that nothing is asked of it). */
+TEST(limits_of_the_cfl_number) {
+    DOUBLE_ONLY();
+    for (int i = 1; i < 4; i++) {
+        const double limit = (double)tlsph_cfl_limit((tlsph_integrator)i);
+        CHECK_BELOW(noise_gain(i, limit), 1);
+        CHECK(noise_gain(i, fmin(1, 1.5 * limit)) > 1);
+    }
+    CHECK((double)tlsph_cfl_limit(TLSPH_RK2) > 0.3);
+    CHECK(!((double)tlsph_cfl_limit((tlsph_integrator)4) > 0));
+}
+
+SUITE(physics_integrators, ENTRY(limits_of_the_cfl_number), ENTRY(momenta_and_energy_of_every_scheme), ENTRY(linear_material_in_every_scheme),
       ENTRY(entropy_of_frozen_dissipation), ENTRY(orders_in_time), ENTRY(loads_at_the_right_stage_times),
       ENTRY(two_cells_are_stable_with_three_stages))

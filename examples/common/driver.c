@@ -140,7 +140,10 @@ tlsph_result driver_run_to(driver *d, double time) {
     tlsph_solver *solver = d->body->solver;
     while (d->result == TLSPH_OK && time - (double)tlsph_time(solver) > close) {
         d->result = tlsph_step(solver, (tlsph_real)(time - (double)tlsph_time(solver)));
-        if (d->result == TLSPH_OK) driver_stepped(d);
+        if (d->result != TLSPH_OK) break;
+        if (d->stride < 2 || tlsph_step_count(solver) % (uint64_t)d->stride == 0 ||
+            time - (double)tlsph_time(solver) <= close)
+            driver_stepped(d);
     }
     return d->result;
 }
@@ -308,7 +311,7 @@ int driver_plot(driver *d, const char *file, const driver_history *h, const driv
     memset(curves, 0, sizeof curves);
     for (int i = 0; i < count && i < MOST_CHARTS; i++) {
         axes[i].title = charts[i].title;
-        axes[i].x_label = "t [s]";
+        axes[i].x_label = h->x_label ? h->x_label : "t [s]";
         axes[i].y_label = charts[i].y_label;
         for (int j = 0; j < charts[i].count; j++) {
             ex_curve curve = { charts[i].names[j], h->time, driver_column(h, charts[i].first + j), h->count, 0, j };

@@ -23,6 +23,7 @@ typedef struct driver {
     double next_frame, frame_interval;      /* s */
     void (*step)(struct driver *d);         /* called after each step with `now` up to date; may be NULL */
     void *user;
+    int stride;                             /* steps from one ledger row and callback to the next; 0: one */
     tlsph_ledger now;
     tlsph_result result;
 } driver;
@@ -74,6 +75,7 @@ typedef struct driver_history {
     double *time, *values;  /* values column by column once closed: see driver_column */
     size_t count, capacity;
     int columns;
+    const char *x_label;    /* NULL: time, "t [s]" */
     int bad;                /* memory ran out: what came before is kept */
 } driver_history;
 

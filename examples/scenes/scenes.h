@@ -526,4 +526,32 @@ tlsph_result manufactured_create(const manufactured_parameters *parameters, manu
 tlsph_result manufactured_run(manufactured *cube, int instants, void (*step)(void *user), void *user,
                               manufactured_errors *out);
 
+/* ---- pulled column: 002 section 5.4, figures 19 and 20 ----------------------------------------------------------- */
+
+typedef struct pulled_column_parameters {
+    scene_options options;   /* end_time 0: from `elongation` */
+    int n;                   /* spacings across the width of 1 m, 6 n along the length of 6 m */
+    int centred;             /* 1: particles at cell centres (n x n x 6n, as in 002), 0: on the faces */
+    double poisson, speed;   /* m/s, of the driven end */
+    double elongation;       /* at which the pull ends, percent */
+} pulled_column_parameters;
+
+typedef struct pulled_column {
+    scene_body body;
+    pulled_column_parameters parameters;
+    size_t tip;              /* a driven particle */
+} pulled_column;
+
+void pulled_column_default(pulled_column_parameters *parameters);
+tlsph_result pulled_column_create(const pulled_column_parameters *parameters, pulled_column *out, tlsph_error *error);
+/* Time at which the pull ends, s. */
+double pulled_column_end(const pulled_column_parameters *parameters);
+/* (L' - L)/L now, percent (002-49). */
+double pulled_column_elongation(const pulled_column *column);
+/* Force that pulls the fixed end down, N: sum of P_zZ dA over the layer of particles beside it. */
+double pulled_column_force(const pulled_column *column);
+/* Force on a homogeneous bar of the same section (1 m^2) stretched by `stretch`, sides free, N: of psi = mu/2 (J^(-2/3) F:F
+   - 3) + kappa/2 (J - 1)^2, with the stretch of the sides from P = 0 there. */
+double pulled_column_bar_force(const tlsph_material *material, double stretch);
+
 #endif

@@ -1,0 +1,49 @@
+/* The column of 002 section 5.4: it follows a homogeneous bar, and the full set of unknowns holds where {p,F} holds. */
+#include "physics.h"
+
+/* Pulls to `elongation` percent; the force at the foot by that of a homogeneous bar, or 0 where the run failed. */
+static double pull(int n, double poisson, tlsph_unknowns unknowns, int centred, double elongation) {
+    pulled_column_parameters p;
+    pulled_column column;
+    double share = 0;
+    pulled_column_default(&p);
+    p.options.unknowns = (int)unknowns;
+    p.n = n;
+    p.poisson = poisson;
+    p.centred = centred;
+    p.elongation = elongation;
+    if (!CHECK_RESULT(pulled_column_create(&p, &column, NULL), TLSPH_OK)) return 0;
+    if (tlsph_advance(column.body.solver, R(pulled_column_end(&p))) == TLSPH_OK) {
+        const double drawn = p.speed * pulled_column_end(&p) / 6 * 100, length = centred ? 6 - 1.0 / n : 6;
+        CHECK_CLOSE(pulled_column_elongation(&column), drawn * 6 / length, 1e-3);
+        share = pulled_column_force(&column) /
+                pulled_column_bar_force(&column.body.material, 1 + pulled_column_elongation(&column) / 100);
+    }
+    scene_destroy(&column.body);
+    return share;
+}
+
+TEST(a_pulled_column_follows_a_bar) {
+    double faces, full, centred;
+    DOUBLE_ONLY();
+    faces = pull(2, 0.45, TLSPH_PF, 0, 150);
+    full = pull(2, 0.495, TLSPH_PFHJ, 0, 60);
+    centred = pull(3, 0.45, TLSPH_PF, 1, 60);
+    REPORT("force by that of a bar %.3f, %.3f, centred %.3f", faces, full, centred);
+    CHECK_CLOSE(faces, 1, 0.1);
+    CHECK_CLOSE(full, 1, 0.1);
+    CHECK_CLOSE(centred, 1, 0.15);
+}
+
+TEST(slow_full_set_holds_where_pF_holds) {
+    DOUBLE_ONLY();
+    for (int i = 0; i < 2; i++) {
+        const double poisson = i ? 0.495 : 0.45, thin = pull(2, poisson, TLSPH_PF, 0, 600);
+        const double full = pull(2, poisson, TLSPH_PFHJ, 0, 600);
+        REPORT(" nu = %g: %.3f, full %.3f", poisson, thin, full);
+        CHECK_CLOSE(thin, 1, 0.1);
+        CHECK_CLOSE(full, 1, 0.1);
+    }
+}
+
+SUITE(physics_pulled_column, ENTRY(a_pulled_column_follows_a_bar), ENTRY(slow_full_set_holds_where_pF_holds))
