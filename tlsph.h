@@ -61,8 +61,8 @@ PROMISES
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
-  [CONDITIONS] [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST] [VORONOI]
-  [FILL] [LICENCE]
+  [CONDITIONS] [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST]
+  [PREFLIGHT] [VORONOI] [FILL] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -535,6 +535,39 @@ typedef struct tlsph_operator {
     const uint32_t *host;          /* host number of each */
 } tlsph_operator;
 
+/* What tlsph_preflight may have to say: code and text. */
+#define TLSPH_HINTS(X)                                                                                                 \
+    X(TLSPH_HINT_WEAK_SUPPORT, "neighbours of a particle lie nearly in a plane or on a line: its gradients are poor")  \
+    X(TLSPH_HINT_THIN, "a body is fewer than 3 particles thick: bending is poor, and two stages are unstable without " \
+                       "loads; take a smaller spacing or TLSPH_SSP_RK3")                                               \
+    X(TLSPH_HINT_IRREGULAR, "corrected kernels do not converge on an irregular cloud; TLSPH_CLOSED does")              \
+    X(TLSPH_HINT_INCOMPRESSIBLE, "nearly incompressible (nu > 0.49) without J evolved: pressures will be noisy; "      \
+                                 "TLSPH_PFJ smooths them")                                                             \
+    X(TLSPH_HINT_CFL, "cfl is above tlsph_cfl_limit of the integrator")                                                \
+    X(TLSPH_HINT_SMALL_PARTICLES, "the least spacing is under a tenth of the largest and sets the time step for all")  \
+    X(TLSPH_HINT_DIFFUSION, "heat conduction, not sound, limits the time step")                                        \
+    X(TLSPH_HINT_UNITS_TIME, "the end time is less than a step or more than 1e8 steps: are units mixed?")              \
+    X(TLSPH_HINT_UNITS_LOAD, "a load or driven velocity exceeds the stiffness or sound speed: are units mixed?")
+
+typedef enum tlsph_hint {
+#define TLSPHI_HINT(id, text) id,
+    TLSPH_HINTS(TLSPHI_HINT)
+#undef TLSPHI_HINT
+    TLSPH_HINT_COUNT
+} tlsph_hint;
+
+/* A scene before it runs (see tlsph_preflight). */
+typedef struct tlsph_preflight_report {
+    unsigned hints;                     /* bit 1u << hint is set for each tlsph_hint */
+    size_t particles, pairs, bodies, smallest_body, bytes;
+    size_t weakest; double support;     /* host number of the particle whose neighbours lie least evenly; 1: evenly, 0: in
+                                           a plane */
+    double spacing_least, spacing_most; /* tau, m */
+    double time_step, steps;            /* s; steps to the end time if the state does not stiffen */
+    double crossings;                   /* times that sound crosses the longest body till then */
+    double pair_visits;                 /* pairs x stages x steps: cost, to be multiplied by the bench's time a pair */
+} tlsph_preflight_report;
+
 /* Both sides of a pair for tlsph_pair_dissipation. 3-D; tensors row-major. */
 typedef struct tlsph_pair_side {
     tlsph_real velocity[3], velocity_gradient[9];
@@ -612,6 +645,10 @@ TLSPH_API int tlsph_field_components(tlsph_field field);
 TLSPH_API size_t tlsph_body_count(const tlsph_solver *solver);
 TLSPH_API void tlsph_operator_view(const tlsph_solver *solver, tlsph_operator *view);
 TLSPH_API void tlsph_size_read(const tlsph_solver *solver, tlsph_size *size);
+/* What a created scene will cost until end_time (s) and what looks wrong about it; what is certainly wrong, tlsph_create
+   has refused. */
+TLSPH_API void tlsph_preflight(const tlsph_solver *solver, tlsph_real end_time, tlsph_preflight_report *report);
+TLSPH_API const char *tlsph_hint_text(tlsph_hint hint);
 /* All zero where the operator is not TLSPH_CLOSED. */
 TLSPH_API void tlsph_closure_read(const tlsph_solver *solver, tlsph_closure *closure);
 TLSPH_API void tlsph_ledger_read(const tlsph_solver *solver, tlsph_ledger *ledger);
@@ -6576,6 +6613,122 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
     if (!r) r = tlsphi_voronoi_measure(&v, &m, volumes, areas, error);
     tlsphi_plan_release(&v.plan);
     return r;
+}
+
+/* ==== [PREFLIGHT] ================================================================================================== */
+
+TLSPHI_DEF const char *tlsph_hint_text(tlsph_hint hint) {
+    static const char *const texts[] = {
+#define TLSPHI_HINT(id, text) text,
+        TLSPH_HINTS(TLSPHI_HINT)
+#undef TLSPHI_HINT
+    };
+    return (unsigned)hint < (unsigned)TLSPH_HINT_COUNT ? texts[hint] : "no such hint";
+}
+static void tlsphi_hint(tlsph_preflight_report *r, tlsph_hint hint, int holds) {
+    if (holds) r->hints |= 1u << hint;
+}
+/* How evenly the neighbours of a lie around it: dim times the least eigenvalue of sum |C| e (x) e / sum |C|, e = C/|C|. */
+static double tlsphi_evenness(const tlsph_solver *s, size_t a) {
+    double K[9] = {0}, Q[9], sum = 0;
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        double C[3];
+        tlsphi_vector3(s->g + (size_t)s->dim * k, s->dim, C);
+        const double length = sqrt(tlsphi_norm2(C));
+        for (int i = 0; i < 9 && length > 0; i++) K[i] += C[i / 3] * C[i % 3] / length;
+        sum += length;
+    }
+    if (s->dim == 2) K[8] = sum;
+    tlsphi_eigen(K, Q);
+    return sum > 0 ? s->dim * tlsphi_dmin(K[0], tlsphi_dmin(K[4], K[8])) / sum : 0;
+}
+/* Corrected kernels: inside a lattice the antisymmetric parts add up to zero, inside an irregular cloud they do not. */
+static int tlsphi_is_irregular(const tlsph_solver *s) {
+    size_t inside = 0, open = 0;
+    for (size_t a = 0; s->M && a < s->n; a++) {
+        double B[3];
+        if (s->first[a + 1] - s->first[a] < s->size.neighbours_most) continue;
+        tlsphi_vector3(s->B + (size_t)s->dim * a, s->dim, B);
+        inside++;
+        open += sqrt(tlsphi_norm2(B)) > 1e-3 * pow((double)s->V[a], (s->dim - 1.0) / s->dim);
+    }
+    return 2 * open > inside;
+}
+static double tlsphi_survey_particles(const tlsph_solver *s, tlsph_preflight_report *r) {
+    double sound_step = TLSPHI_LARGEST;
+    r->support = r->spacing_least = TLSPHI_LARGEST;
+    for (size_t a = 0; a < s->n; a++) {
+        const double even = tlsphi_evenness(s, a), tau = (double)s->tau[a];
+        if (even < r->support) {
+            r->support = even;
+            r->weakest = s->host[a];
+        }
+        r->spacing_least = tlsphi_dmin(r->spacing_least, tau);
+        r->spacing_most = tlsphi_dmax(r->spacing_most, tau);
+        if (s->wave[4 * a] > 0) sound_step = tlsphi_dmin(sound_step, (double)s->cfl * tau / (double)s->wave[4 * a]);
+    }
+    return sound_step;
+}
+/* Sizes of the bodies; returns the longest extent, m. */
+static double tlsphi_survey_bodies(const tlsph_solver *s, tlsph_preflight_report *r) {
+    const size_t D = (size_t)s->dim;
+    double longest = 0;
+    r->smallest_body = s->n;
+    for (size_t i = 0; i < s->bodies; i++) {
+        const size_t begin = s->body[i].first, end = i + 1 < s->bodies ? s->body[i + 1].first : s->n;
+        double volume = 0, thin = TLSPHI_LARGEST;
+        for (size_t a = begin; a < end; a++) volume += (double)s->V[a];
+        for (size_t k = 0; k < D; k++) {
+            double low = TLSPHI_LARGEST, high = -TLSPHI_LARGEST;
+            for (size_t a = begin; a < end; a++) {
+                low = tlsphi_dmin(low, (double)s->X[D * a + k]);
+                high = tlsphi_dmax(high, (double)s->X[D * a + k]);
+            }
+            thin = tlsphi_dmin(thin, high - low);
+            longest = tlsphi_dmax(longest, high - low);
+        }
+        if (end - begin < r->smallest_body) r->smallest_body = end - begin;
+        tlsphi_hint(r, TLSPH_HINT_THIN, thin < 1.5 * pow(volume / (double)(end - begin), 1.0 / s->dim));
+    }
+    return longest;
+}
+static int tlsphi_load_is_huge(const tlsph_solver *s, const tlsphi_load *load, double length) {
+    const tlsphi_material *m = tlsphi_material_of(s, load->given.count ? load->inner[0] : 0);
+    const tlsph_real *v = load->given.value;
+    const double value = sqrt((double)tlsphi_dot(3, v, v)), stiffness = (double)(m->kappa + m->mu);
+    switch (load->given.kind) {
+    case TLSPH_VELOCITY: return value > sqrt(stiffness / (double)m->rho);
+    case TLSPH_TRACTION:
+    case TLSPH_PRESSURE: return value > stiffness;
+    case TLSPH_BODY_FORCE: return value * length > stiffness;
+    case TLSPH_ACCELERATION: return value * length * (double)m->rho > stiffness;
+    default: return 0;
+    }
+}
+TLSPHI_DEF void tlsph_preflight(const tlsph_solver *s, tlsph_real end_time, tlsph_preflight_report *r) {
+    memset(r, 0, sizeof *r);
+    const double end = (double)end_time, sound_step = tlsphi_survey_particles(s, r);
+    const double length = tlsphi_survey_bodies(s, r);
+    r->particles = s->n;
+    r->pairs = s->pairs;
+    r->bodies = s->bodies;
+    r->bytes = s->size.bytes;
+    r->time_step = (double)tlsph_stable_time_step(s);
+    r->steps = ceil(tlsphi_dmax(end - s->time, 0) / r->time_step);
+    r->crossings = sound_step < TLSPHI_LARGEST
+                       ? tlsphi_dmax(end - s->time, 0) * (double)s->cfl * r->spacing_least / (sound_step * length)
+                       : 0;
+    r->pair_visits = (double)s->pairs * tlsphi_schemes[s->integrator].stages * r->steps;
+    tlsphi_hint(r, TLSPH_HINT_WEAK_SUPPORT, r->support < 0.1);
+    tlsphi_hint(r, TLSPH_HINT_IRREGULAR, tlsphi_is_irregular(s));
+    for (size_t i = 0; i < s->material_count && !s->has_J; i++) /* kappa/mu at nu = 0.49 */
+        tlsphi_hint(r, TLSPH_HINT_INCOMPRESSIBLE, s->materials[i].kappa > 49.7 * s->materials[i].mu);
+    tlsphi_hint(r, TLSPH_HINT_CFL, s->cfl > tlsph_cfl_limit(s->integrator));
+    tlsphi_hint(r, TLSPH_HINT_SMALL_PARTICLES, r->spacing_least < 0.1 * r->spacing_most);
+    tlsphi_hint(r, TLSPH_HINT_DIFFUSION, r->time_step < 0.5 * sound_step && s->conducts);
+    tlsphi_hint(r, TLSPH_HINT_UNITS_TIME, end > 0 && (end < r->time_step || r->steps > 1e8));
+    for (size_t i = 0; i < s->loads; i++)
+        tlsphi_hint(r, TLSPH_HINT_UNITS_LOAD, tlsphi_load_is_huge(s, s->load + i, length));
 }
 
 /* ==== [FILL] =======================================================================================================

@@ -104,12 +104,32 @@ const char *driver_path(driver *d, const char *file) {
     return path;
 }
 
+/* --check: what the scene will cost and what looks wrong about it. */
+static void print_preflight(const scene_body *body, double end_time) {
+    tlsph_preflight_report r;
+    tlsph_preflight(body->solver, (tlsph_real)end_time, &r);
+    printf("%lu particles, %lu connected part(s), %lu pairs, %.3g MB\n", (unsigned long)r.particles, (unsigned long)r.bodies,
+           (unsigned long)r.pairs, 1e-6 * (double)r.bytes);
+    printf("spacing %.3g to %.3g m, first time step %.3g s\n", r.spacing_least, r.spacing_most, r.time_step);
+    printf("%.3g steps to %g s, in which sound crosses the body %.3g times; %.3g visits of pairs\n", r.steps, end_time,
+           r.crossings, r.pair_visits);
+    printf("least even neighbours: particle %lu, %.2f (1: all around, 0: in a plane)\n", (unsigned long)r.weakest,
+           r.support);
+    for (int i = 0; i < TLSPH_HINT_COUNT; i++)
+        if (r.hints >> i & 1) printf("hint: %s\n", tlsph_hint_text((tlsph_hint)i));
+    if (!r.hints) printf("no doubts\n");
+}
+
 int driver_begin(driver *d, const char *name, const scene_options *options, scene_body *body, double end_time) {
     memset(d, 0, sizeof *d);
     d->options = options;
     d->body = body;
     if (options->output && options->output[0]) snprintf(d->folder, sizeof d->folder, "%s", options->output);
     else snprintf(d->folder, sizeof d->folder, "out/%s", name);
+    if (options->check) {
+        print_preflight(body, end_time);
+        exit(0);
+    }
     d->frame_interval = options->frames > 1 ? end_time / (options->frames - 1) : HUGE_VAL;
     if (ex_make_directory(d->folder) || ex_csv_open(&d->ledger, d->folder, "ledger.csv", ledger_header) ||
         ex_series_open(&d->series, d->folder, name)) {

@@ -35,7 +35,7 @@ void driver_arguments(int argc, char **argv, const char *program, const char *su
 int driver_error(const tlsph_error *error);
 
 /* Makes the folder (--output or out/<name>), opens ledger.csv and the VTK series and writes the first frame. Returns 0,
-   or 1 with a line on stderr where the folder cannot be written. */
+   or 1 with a line on stderr where the folder cannot be written. With --check it tells the scene's cost and exits. */
 int driver_begin(driver *d, const char *name, const scene_options *options, scene_body *body, double end_time);
 /* Ledger row, frame where one is due, progress and the step callback. */
 void driver_stepped(driver *d);

@@ -47,6 +47,7 @@ static ex_option whole(const char *name, int *value, double low, double high, co
 
 void scene_option_table(scene_options *o, ex_option *table) {
     const ex_option quiet = { "quiet", EX_FLAG, &o->quiet, NULL, NULL, 0, 0, "no progress lines" };
+    const ex_option check = { "check", EX_FLAG, &o->check, NULL, NULL, 0, 0, "tell cost and doubts of the scene, do not run it" };
     const ex_option output = { "output", EX_TEXT, &o->output, NULL, NULL, 0, 0, "folder to write to" };
     size_t i = 0;
     table[i++] = real("end-time", &o->end_time, "s", 1e-12, 1e12, "time to stop at");
@@ -70,6 +71,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = whole("threads", &o->threads, 0, 4096, "threads; 0: OpenMP's own choice");
     table[i++] = whole("frames", &o->frames, 0, 100000, "frames written as VTK files");
     table[i++] = output;
+    table[i++] = check;
     table[i++] = quiet;
 }
 
