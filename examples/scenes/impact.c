@@ -45,6 +45,40 @@ tlsph_result impact_create(const impact_parameters *p, impact *out, tlsph_error 
     return result;
 }
 
+/* Behind the shock the body rests, so that all of the kinetic energy has become internal energy e = rho v^2/2; mass and
+   momentum across the shock, which runs at W = v/(1 - J) in the reference, ask for P_XX = -rho v W. With the temperature from
+   e(J, theta) the compression J is what remains to be found. Returns the excess of -P_XX over rho v W. */
+static double rankine_hugoniot(const impact_parameters *p, double J, impact_star *star) {
+    const tlsph_material *m = &p->material;
+    const double rho = (double)m->density, theta_R = (double)m->reference_temperature;
+    const tlsph_real F[9] = { (tlsph_real)J, 0, 0, 0, 1, 0, 0, 0, 1 };
+    tlsph_material_state state;
+    star->jacobian = J;
+    star->temperature = theta_R;
+    if (tlsph_material_evaluate(m, F, (tlsph_real)theta_R, &state) != TLSPH_OK) return HUGE_VAL;
+    star->temperature += (rho * p->speed * p->speed / 2 - (double)state.internal_energy) / (rho * (double)m->specific_heat);
+    if (tlsph_material_evaluate(m, F, (tlsph_real)star->temperature, &state) != TLSPH_OK) return HUGE_VAL;
+    star->stress = (double)state.P[0];
+    return -star->stress - rho * p->speed * p->speed / (1 - J);
+}
+
+double impact_exact(const impact_parameters *p, impact_star *star) {
+    double low = 1e-3, high = 1; /* too much pressure at strong compression, too little at none */
+    for (int i = 0; i < 200; i++) {
+        const double middle = (low + high) / 2;
+        if (rankine_hugoniot(p, middle, star) > 0) low = middle;
+        else high = middle;
+    }
+    rankine_hugoniot(p, (low + high) / 2, star);
+    return p->speed / (1 - star->jacobian);
+}
+
+double impact_p_speed(const tlsph_material *material) {
+    double p_wave, bulk, shear;
+    scene_moduli(material, &p_wave, &bulk, &shear);
+    return sqrt(p_wave / (double)material->density);
+}
+
 /* The jacobian of scenes that do not evolve it is read as det F by the same field. */
 void impact_read(const impact *bar, double shock_speed, double from, double to, const impact_star *exact,
                  impact_star *mean, double *overshoot) {

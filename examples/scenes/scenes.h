@@ -276,6 +276,10 @@ typedef struct impact {
 
 void impact_default(impact_parameters *parameters);
 tlsph_result impact_create(const impact_parameters *parameters, impact *out, tlsph_error *error);
+/* Exact star state, from the jump conditions; returns the shock's speed in the reference, m/s. */
+double impact_exact(const impact_parameters *parameters, impact_star *star);
+/* Isothermal p speed at rest, the scale of impact speeds, m/s. */
+double impact_p_speed(const tlsph_material *material);
 /* Means over |X| between the shares `from` and `to` of the shock's place now (speed of the shock: m/s, reference), and
    largest overshoot of -P_XX over the exact star stress, as a share of it. */
 void impact_read(const impact *bar, double shock_speed, double from, double to, const impact_star *exact,
