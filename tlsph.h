@@ -62,7 +62,7 @@ INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
   [CONDITIONS] [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST]
-  [PREFLIGHT] [VORONOI] [FILL] [LICENCE]
+  [PREFLIGHT] [VORONOI] [FILL] [REPRODUCING] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -579,6 +579,22 @@ typedef struct tlsph_pair_flux { tlsph_real D_p[3], D_J, D_E, production; } tlsp
 
 typedef struct tlsph_solver tlsph_solver;
 
+/* Nodes around a place for tlsph_reproduce. */
+typedef struct tlsph_nodes {
+    int dimension, order;         /* 1 to 3; monomials that are reproduced exactly: up to order 1 or 2 */
+    tlsph_kernel kernel;
+    size_t count;
+    const tlsph_real *positions;  /* 3 each, m */
+    const tlsph_real *radii;      /* of each node's support, m, > 0 */
+} tlsph_nodes;
+/* Where tlsph_reproduce writes, each node's values together; an entry that is NULL is left out. */
+typedef struct tlsph_shape_functions {
+    tlsph_real *value;             /* Psi_I(x), 1 each (003-22) */
+    tlsph_real *gradient;          /* grad Psi_I(x), 3 each, 1/m (003-23) */
+    tlsph_real *implicit;          /* implicit gradient Psi^nabla_Ii(x), 3 each, 1/m (003-28) */
+    tlsph_real *implicit_gradient; /* its derivatives (Psi^nabla_Ii,j + Psi^nabla_Ij,i)/2, 9 each, 1/m^2 (003-39) */
+} tlsph_shape_functions;
+
 /* ==== [API-FUNCTIONS] ==============================================================================================
    By lifetime. `error` may be NULL everywhere. Unless said otherwise a function may be called for different solvers on
    different threads at once, and costs O(count). */
@@ -689,6 +705,17 @@ TLSPH_API tlsph_result tlsph_material_check(const tlsph_material *material, doub
 TLSPH_API void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_side *a, const tlsph_pair_side *b,
                                       const tlsph_real C[3], const tlsph_real c[3], const tlsph_real d[3], tlsph_real a_J,
                                       tlsph_pair_flux *out);
+
+/* -- reproducing kernels (003 section 3), usable alone; thread-safe -- */
+/* Shape functions at x of all nodes given; nodes out of reach get zeros. sum_I Psi_I(x) f(X_I) = f(x) for every polynomial
+   f up to the order, and its derivatives follow likewise from gradient and implicit gradient. ERROR_DESCRIPTION for an
+   impossible dimension or order, ERROR_NEIGHBOURS where the nodes in reach do not determine a polynomial. */
+TLSPH_API tlsph_result tlsph_reproduce(const tlsph_nodes *nodes, const tlsph_real x[3],
+                                       const tlsph_shape_functions *out, tlsph_error *error);
+/* Weight W = V (m^d) of a node that stands at x for the box between `low` and `high`, and its second moments
+   M_i = integral of (X_i - x_i)^2 over the box (003-35). */
+TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const tlsph_real high[3], const tlsph_real x[3],
+                                  tlsph_real *weight, tlsph_real second[3]);
 
 #ifdef __cplusplus
 }
@@ -7109,6 +7136,158 @@ TLSPHI_DEF size_t tlsph_select_plane(const tlsph_particles *particles, int axis,
     plane.value = value;
     plane.tolerance = tolerance;
     return tlsph_select(particles, tlsphi_in_plane, &plane, out, capacity);
+}
+
+/* ==== [REPRODUCING] ================================================================================================
+   Psi_I(x) = e_0^T M^-1 H(z) Phi,  z = x - X_I,  M(x) = sum_I H H^T Phi, with H the monomials of z up to the order (003-16
+   to 22). With e_i, minus one at the i-th linear monomial, instead of e_0 it is the implicit gradient (28). Every such sum
+   has the derivative  c^T (dH Phi + H dPhi) - (M^-1 dM c)^T H Phi,  c = M^-1 e  (23, 24). Lengths are in units of the
+   largest radius in reach, so that M is well conditioned at any scale. */
+
+enum { TLSPHI_MONOMIALS = 10 };
+typedef struct tlsphi_monomials { double H[TLSPHI_MONOMIALS], dH[3][TLSPHI_MONOMIALS], phi, dphi[3]; } tlsphi_monomials;
+typedef struct tlsphi_moments {
+    int dim, count;
+    double scale, M[TLSPHI_MONOMIALS][TLSPHI_MONOMIALS], dM[3][TLSPHI_MONOMIALS][TLSPHI_MONOMIALS];
+    double c[4][TLSPHI_MONOMIALS], dc[4][3][TLSPHI_MONOMIALS];
+} tlsphi_moments;
+
+/* Monomials and kernel of one node at x, with derivatives by x. 0 where it is out of reach. */
+static int tlsphi_node_at(const tlsph_nodes *nodes, size_t node, const tlsph_real *x, double scale,
+                          tlsphi_monomials *out) {
+    const int dim = nodes->dimension;
+    const double h = (double)nodes->radii[node] / 2 / scale;
+    double z[3] = {0, 0, 0}, r = 0, W, dW, W0, dW0;
+    for (int i = 0; i < dim; i++) {
+        z[i] = ((double)x[i] - (double)nodes->positions[3 * node + (size_t)i]) / scale;
+        r += z[i] * z[i];
+    }
+    r = sqrt(r);
+    if (!(r < 2 * h)) return 0;
+    tlsphi_kernel(nodes->kernel, 3, r, h, &W, &dW);
+    tlsphi_kernel(nodes->kernel, 3, 0, h, &W0, &dW0);
+    memset(out, 0, sizeof *out);
+    out->phi = W / W0;
+    for (int i = 0; i < dim; i++) out->dphi[i] = r > 0 ? dW / W0 * z[i] / r : 0;
+    out->H[0] = 1;
+    for (int i = 0; i < dim; i++) {
+        out->H[1 + i] = z[i];
+        out->dH[i][1 + i] = 1;
+    }
+    for (int i = 0, k = 1 + dim; nodes->order == 2 && i < dim; i++)
+        for (int j = i; j < dim; j++, k++) {
+            out->H[k] = z[i] * z[j];
+            out->dH[i][k] += z[j];
+            out->dH[j][k] += z[i];
+        }
+    return out->phi > 0;
+}
+static void tlsphi_add_moments(tlsphi_moments *m, const tlsphi_monomials *n) {
+    for (int i = 0; i < m->count; i++)
+        for (int j = 0; j < m->count; j++) {
+            m->M[i][j] += n->H[i] * n->H[j] * n->phi;
+            for (int k = 0; k < m->dim; k++)
+                m->dM[k][i][j] += (n->dH[k][i] * n->H[j] + n->H[i] * n->dH[k][j]) * n->phi + n->H[i] * n->H[j] * n->dphi[k];
+        }
+}
+/* M = L L^T in place; 0 where M is singular. */
+static int tlsphi_factor_moments(tlsphi_moments *m) {
+    for (int i = 0; i < m->count; i++) {
+        const double largest = m->M[i][i];
+        for (int j = 0; j <= i; j++) {
+            double sum = m->M[i][j];
+            for (int k = 0; k < j; k++) sum -= m->M[i][k] * m->M[j][k];
+            if (j < i) m->M[i][j] = sum / m->M[j][j];
+            else if (!(sum > 1e-12 * largest)) return 0;
+            else m->M[i][i] = sqrt(sum);
+        }
+    }
+    return 1;
+}
+static void tlsphi_solve_moments(const tlsphi_moments *m, double *b) {
+    for (int i = 0; i < m->count; i++) {
+        for (int k = 0; k < i; k++) b[i] -= m->M[i][k] * b[k];
+        b[i] /= m->M[i][i];
+    }
+    for (int i = m->count - 1; i >= 0; i--) {
+        for (int k = i + 1; k < m->count; k++) b[i] -= m->M[k][i] * b[k];
+        b[i] /= m->M[i][i];
+    }
+}
+/* c = M^-1 e and its derivatives for the shape function (0) and the implicit gradients (1 to dim). */
+static void tlsphi_find_coefficients(tlsphi_moments *m) {
+    for (int r = 0; r <= m->dim; r++) {
+        m->c[r][r] = r ? -1 : 1;
+        tlsphi_solve_moments(m, m->c[r]);
+        for (int k = 0; k < m->dim; k++) {
+            for (int i = 0; i < m->count; i++)
+                for (int j = 0; j < m->count; j++) m->dc[r][k][i] -= m->dM[k][i][j] * m->c[r][j];
+            tlsphi_solve_moments(m, m->dc[r][k]);
+        }
+    }
+}
+/* The r-th function of a node and its gradient, in units of 1/scale. */
+static double tlsphi_shape_value(const tlsphi_moments *m, const tlsphi_monomials *n, int r, double gradient[3]) {
+    double value = 0;
+    for (int k = 0; k < 3; k++) gradient[k] = 0;
+    for (int i = 0; i < m->count; i++) {
+        value += m->c[r][i] * n->H[i] * n->phi;
+        for (int k = 0; k < m->dim; k++)
+            gradient[k] += m->c[r][i] * (n->dH[k][i] * n->phi + n->H[i] * n->dphi[k]) + m->dc[r][k][i] * n->H[i] * n->phi;
+    }
+    return value;
+}
+static void tlsphi_store_shape(const tlsphi_moments *m, const tlsphi_monomials *n, size_t node,
+                               const tlsph_shape_functions *out) {
+    double value[4], gradient[4][3];
+    memset(value, 0, sizeof value);
+    memset(gradient, 0, sizeof gradient);
+    for (int r = 0; n && r <= m->dim; r++) value[r] = tlsphi_shape_value(m, n, r, gradient[r]);
+    if (out->value) out->value[node] = (tlsph_real)value[0];
+    for (size_t i = 0; i < 3; i++) {
+        if (out->gradient) out->gradient[3 * node + i] = (tlsph_real)(gradient[0][i] / m->scale);
+        if (out->implicit) out->implicit[3 * node + i] = (tlsph_real)(value[1 + i] / m->scale);
+        for (size_t j = 0; out->implicit_gradient && j < 3; j++)
+            out->implicit_gradient[9 * node + 3 * i + j] =
+                (tlsph_real)((gradient[1 + i][j] + gradient[1 + j][i]) / (2 * m->scale * m->scale));
+    }
+}
+static double tlsphi_largest_radius(const tlsph_nodes *nodes) {
+    double largest = 0;
+    for (size_t a = 0; a < nodes->count; a++) largest = tlsphi_dmax(largest, (double)nodes->radii[a]);
+    return largest;
+}
+TLSPHI_DEF tlsph_result tlsph_reproduce(const tlsph_nodes *nodes, const tlsph_real x[3],
+                                        const tlsph_shape_functions *out, tlsph_error *error) {
+    const int dim = nodes->dimension, order = nodes->order;
+    tlsphi_monomials n;
+    tlsphi_moments m;
+    tlsphi_no_error(error);
+    if (dim < 1 || dim > 3 || order < 1 || order > 2)
+        return tlsphi_fail(error, TLSPH_ERROR_DESCRIPTION, "reproduce", dim < 1 || dim > 3 ? "dimension" : "order",
+                           TLSPH_NO_PARTICLE, dim < 1 || dim > 3 ? dim : order, 0, "1 to 3, and order 1 or 2");
+    memset(&m, 0, sizeof m);
+    m.dim = dim;
+    m.count = order == 1 ? 1 + dim : (dim + 1) * (dim + 2) / 2;
+    m.scale = tlsphi_largest_radius(nodes);
+    for (size_t a = 0; a < nodes->count; a++)
+        if (tlsphi_node_at(nodes, a, x, m.scale, &n)) tlsphi_add_moments(&m, &n);
+    if (!tlsphi_factor_moments(&m))
+        return tlsphi_fail(error, TLSPH_ERROR_NEIGHBOURS, "reproduce", "nodes", TLSPH_NO_PARTICLE, (double)nodes->count,
+                           m.count, "so many in reach that they determine a polynomial of this order");
+    tlsphi_find_coefficients(&m);
+    for (size_t a = 0; a < nodes->count; a++)
+        tlsphi_store_shape(&m, tlsphi_node_at(nodes, a, x, m.scale, &n) ? &n : NULL, a, out);
+    return TLSPH_OK;
+}
+TLSPHI_DEF void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const tlsph_real high[3], const tlsph_real x[3],
+                                   tlsph_real *weight, tlsph_real second[3]) {
+    *weight = 1;
+    for (int i = 0; i < dimension; i++) *weight *= high[i] - low[i];
+    for (int i = 0; i < dimension; i++) {
+        const tlsph_real a = low[i] - x[i], b = high[i] - x[i];
+        second[i] = *weight * (a * a + a * b + b * b) / 3;
+    }
 }
 
 #endif /* TLSPH_IMPLEMENTATION_DONE */
