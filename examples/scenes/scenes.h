@@ -557,5 +557,38 @@ double pulled_column_force(const pulled_column *column);
 /* Force on a homogeneous bar of the same section (1 m^2) stretched by `stretch`, sides free, N: of psi = mu/2 (J^(-2/3) F:F
    - 3) + kappa/2 (J - 1)^2, with the stretch of the sides from P = 0 there. */
 double pulled_column_bar_force(const tlsph_material *material, double stretch);
+/* ---- implicit reproducing-kernel bar: 003 sections 8 and 9 ------------------------------------------------------- */
+
+/* How the weak form is integrated (003 section 9): at the nodes, with corrected test functions (VC), stabilised (NSNI), or
+   with five Gauss points between nodes. */
+typedef enum rkpm_method { RKPM_DNI, RKPM_VC_DNI, RKPM_NSNI, RKPM_VC_NSNI, RKPM_GAUSS, RKPM_METHODS } rkpm_method;
+extern const char *const rkpm_names[RKPM_METHODS];
+
+typedef struct rkpm_parameters {
+    int method, problem;       /* a rkpm_method, a danilovskaya_problem */
+    int quasi_static;          /* 1: without inertia (first problem) */
+    int newmark, lumped;       /* 1: Newmark and Crank-Nicolson, else backward differences; 1: lumped mass */
+    int symmetric;             /* 1: the symmetric part of the stiffness instead of it, to see what asymmetry does */
+    double delta, spacing, length, jitter, time_step; /* as in the half space; inner nodes move by jitter x spacing */
+    unsigned long seed;
+} rkpm_parameters;
+
+typedef struct rkpm_bar rkpm_bar;
+
+void rkpm_default(rkpm_parameters *parameters);
+/* NULL without memory, or where nodes are too irregular. */
+rkpm_bar *rkpm_create(const rkpm_parameters *parameters);
+void rkpm_destroy(rkpm_bar *bar);
+/* One time step; 0 on success, 1 where the matrix is singular. */
+int rkpm_step(rkpm_bar *bar);
+double rkpm_time(const rkpm_bar *bar);
+/* Places of the nodes, and the state there. Returns the number of nodes. */
+size_t rkpm_read(const rkpm_bar *bar, const double **y, const danilovskaya_state **state);
+/* Relative L2 errors now over the bar. */
+danilovskaya_errors rkpm_compare(const rkpm_bar *bar);
+/* Patch test of 003 section 9.1 on `nodes` nodes: L2 norms of the errors of u = x and theta = x. 0 on success. */
+int rkpm_patch(rkpm_method method, int nodes, double jitter, unsigned long seed, double *error_u, double *error_theta);
+/* Free elastic vibration from a random shape until `end`: rate (1/t) at which its amplitude grows over the second half. */
+int rkpm_growth(const rkpm_parameters *parameters, double end, double *rate);
 
 #endif
