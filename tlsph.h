@@ -376,6 +376,10 @@ typedef struct tlsph_desc {
     tlsph_integrator integrator;         /* default TLSPH_RK2 */
     tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1], see tlsph_cfl_limit */
     tlsph_step_rule step_rule;           /* default TLSPH_STEP_BY_PARTICLE */
+    int retries;                         /* what a step does that inverts a particle or meets a temperature below zero:
+                                            default 0: it ends with the error; up to 30: it is taken again with half the
+                                            size, so often at most. Counted in the ledger. Helps where a load is faster
+                                            than the step, not where a body has collapsed */
     int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
     tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP, else serial */
@@ -422,6 +426,7 @@ typedef struct tlsph_ledger {
     double external_entropy;       /* cumulative, that came with the external heat */
     double projection_work;        /* cumulative, on the rigid motion: what the dissipation had taken from it */
     double contact_loss;           /* cumulative kinetic energy stopped by walls (thermal scenes: turned into heat) */
+    uint64_t retries;              /* cumulative steps that were taken again with half the size (desc.retries) */
     double impulse[3], angular_impulse[3]; /* cumulative, of loads (not of constraint reactions) */
     double energy_residual;        /* total - initial - work - heat (+ losses where these leave the energy) */
     double linear_residual[3];     /* momentum - initial - impulse; the reactions of constraints show here */
@@ -2760,7 +2765,7 @@ typedef struct tlsphi_load {
 /* Cumulative entries of the ledger, and the values from which they count. */
 typedef struct tlsphi_account {
     double dissipation, dissipation_entropy, conduction_entropy, external_work, external_heat, external_entropy;
-    double projection_work, contact_loss, impulse[3], angular_impulse[3], least_pair_production;
+    double projection_work, contact_loss, retries, impulse[3], angular_impulse[3], least_pair_production;
     double initial_plastic_work, initial_plastic_entropy;
     double initial_energy, initial_entropy, initial_momentum[3], initial_angular[3];
 } tlsphi_account;
@@ -2777,7 +2782,7 @@ typedef struct tlsphi_body {
 
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user, has_plastic;
-    int audit, projection, dissipation_heats, threads, bonds;
+    int audit, projection, dissipation_heats, retries, threads, bonds;
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
     tlsph_integrator integrator;
     tlsph_dissipation dissipation;
@@ -4482,16 +4487,28 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     return TLSPH_OK;
 }
 
+/* A step that fails is taken again, half as long, as often as the scene allows. Then it fails as it did. */
+static tlsph_result tlsphi_step_or_retry(tlsph_solver *s, double *dt) {
+    const double before = s->account.retries;
+    tlsph_result result = tlsphi_step_by(s, *dt);
+    for (int i = 0; result && i < s->retries; i++) {
+        *dt /= 2;
+        s->account.retries++;
+        result = tlsphi_step_by(s, *dt);
+    }
+    if (result) s->account.retries = before;
+    return result;
+}
 TLSPHI_DEF tlsph_result tlsph_step(tlsph_solver *s, tlsph_real dt_limit) {
     const double stable = (double)tlsph_stable_time_step(s); /* (2), (3) */
-    const double dt = (double)dt_limit < stable ? (double)dt_limit : stable;
+    double dt = (double)dt_limit < stable ? (double)dt_limit : stable;
     if (tlsphi_nan(dt_limit) || !tlsphi_finite((tlsph_real)dt) || !(dt > 0) || !(dt < 1e290))
         return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "dt", TLSPH_NO_PARTICLE, (double)dt_limit, 0,
                            "more than 0; infinite only with a finite wave speed");
     if (s->first_dt > 0 && stable < 1e-9 * s->first_dt)
         return tlsphi_fail(&s->error, TLSPH_ERROR_TIME_STEP, "step", "stable dt", TLSPH_NO_PARTICLE, stable,
                            1e-9 * s->first_dt, "more than 1e-9 of the first step; wave speeds have run away");
-    const tlsph_result result = tlsphi_step_by(s, dt);
+    const tlsph_result result = tlsphi_step_or_retry(s, &dt);
     if (!result) s->time += dt;
     if (!result && !(s->first_dt > 0)) s->first_dt = stable;
     return result;
@@ -4506,7 +4523,8 @@ TLSPHI_DEF tlsph_result tlsph_advance(tlsph_solver *s, tlsph_real time) {
         const double dt = left <= stable ? left : left < 2 * stable ? left / 2 : stable;
         const tlsph_result result = tlsph_step(s, (tlsph_real)dt);
         if (result) return result;
-        if (left <= stable || s->time > end) s->time = end;
+        const int whole = s->last_dt > 0.75 * dt; /* and not halved by a retry */
+        if ((left <= stable && whole) || s->time > end) s->time = end;
     }
     return TLSPH_OK;
 }
@@ -4567,6 +4585,7 @@ static void tlsphi_ledger_accounts(const tlsph_solver *s, tlsph_ledger *out) {
     out->external_entropy = c->external_entropy;
     out->projection_work = c->projection_work;
     out->contact_loss = c->contact_loss;
+    out->retries = (uint64_t)c->retries;
     out->least_pair_production = c->least_pair_production < TLSPHI_LARGEST ? c->least_pair_production : 0;
     for (int i = 0; i < 3; i++) {
         out->impulse[i] = c->impulse[i];
@@ -4977,6 +4996,7 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"harmonic", (double)d->harmonic, 0, 100, "0 to 100"},
         {"biharmonic", (double)d->biharmonic, 0, 100, "0 to 100"},
         {"force_form", (double)d->force_form, TLSPH_ADJOINT, TLSPH_FORCE_AS_PRINTED, "a tlsph_force_form"},
+        {"retries", (double)d->retries, 0, 30, "0 to 30"},
         {"step_rule", (double)d->step_rule, TLSPH_STEP_BY_PARTICLE, TLSPH_STEP_BY_PAIR_LINEAR, "a tlsph_step_rule"},
         {"volume_coupling", (double)d->volume_coupling, TLSPH_SPLIT, TLSPH_JOINT_AS_PRINTED, "a tlsph_volume_coupling"},
         {"drift_stiffness", (double)d->drift_stiffness, 0, 1e6, "0 to 1e6"},
@@ -5246,6 +5266,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->bonds = plan->bond != NULL;
     s->force_form = d->force_form;
     s->step_rule = d->step_rule;
+    s->retries = d->retries;
     s->harmonic = (double)d->harmonic * plan->h;
     s->biharmonic = (double)d->biharmonic * plan->h * plan->h * plan->h;
     s->n = plan->n;

@@ -520,6 +520,45 @@ TEST(temperature_below_zero_in_a_step)
     own_cloud_destroy(&s.cloud);
 }
 
+/* Takes more heat than there is from a time on: a step that ends before it is good. */
+static void sudden_sink(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
+                        const tlsph_real *x, tlsph_real *values)
+{
+    const tlsph_real *from = user;
+    (void)particle; (void)X; (void)x;
+    for (size_t i = 0; time > *from && i < count; i++) values[i] = R(-1e9);
+}
+TEST(retries_halve_the_step)
+{
+    static const tlsph_unknowns sets[2] = {TLSPH_PF, TLSPH_PFHJ};
+    for (int i = 0; i < 2; i++)
+        for (int retries = 0; retries < 4; retries++) {
+            spoilt s;
+            tlsph_solver *solver = NULL;
+            tlsph_ledger ledger;
+            tlsph_real from = 0;
+            REQUIRE(spoilt_make(&s, 3));
+            s.desc.unknowns = sets[i];
+            s.desc.condition_count = 1;
+            s.desc.retries = retries;
+            s.conditions[0] = tlsph_condition_default(TLSPH_HEAT_SOURCE);
+            s.conditions[0].values = sudden_sink;
+            s.conditions[0].values_user = &from;
+            REQUIRE_OK(tlsph_create(&s.desc, &solver, NULL));
+            const tlsph_real dt = tlsph_stable_time_step(solver);
+            const uint64_t hash = state_hash(solver);
+            from = R(0.3) * dt; /* a step and its half end after it, a quarter does not */
+            const tlsph_result result = tlsph_step(solver, dt);
+            tlsph_ledger_read(solver, &ledger);
+            CHECK_RESULT(result, retries < 2 ? TLSPH_ERROR_TEMPERATURE : TLSPH_OK);
+            CHECK_SAME(ledger.retries, retries < 2 ? 0 : 2);
+            if (result) CHECK(state_hash(solver) == hash);
+            else CHECK_CLOSE(tlsph_time(solver), (double)dt / 4, 1e-6 * (double)dt);
+            tlsph_destroy(solver);
+            own_cloud_destroy(&s.cloud);
+        }
+}
+
 static void not_a_number(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
                          const tlsph_real *x, tlsph_real *values)
 {
@@ -563,4 +602,5 @@ SUITE(errors, ENTRY(the_unspoilt_scene_is_good), ENTRY(particles_not_finite), EN
       ENTRY(uninitialised_descriptions), ENTRY(impossible_conditions), ENTRY(heat_needs_a_thermal_scene),
       ENTRY(impossible_cells), ENTRY(impossible_pair_vectors), ENTRY(impossible_values_written),
       ENTRY(impossible_time_steps), ENTRY(advance_meets_its_time), ENTRY(inversion_in_a_step),
-      ENTRY(temperature_below_zero_in_a_step), ENTRY(a_load_that_is_not_finite), ENTRY(every_result_has_a_text))
+      ENTRY(temperature_below_zero_in_a_step), ENTRY(retries_halve_the_step),
+      ENTRY(a_load_that_is_not_finite), ENTRY(every_result_has_a_text))
