@@ -591,4 +591,33 @@ int rkpm_patch(rkpm_method method, int nodes, double jitter, unsigned long seed,
 /* Free elastic vibration from a random shape until `end`: rate (1/t) at which its amplitude grows over the second half. */
 int rkpm_growth(const rkpm_parameters *parameters, double end, double *rate);
 
+/* ---- conduction alone: 000-13, 56 -------------------------------------------------------------------------------- */
+
+typedef enum conduction_motion { CONDUCTION_RESTING, CONDUCTION_STRETCHED, CONDUCTION_TURNING } conduction_motion;
+typedef enum conduction_state { CONDUCTION_SPOT, CONDUCTION_MODE, CONDUCTION_ALTERNATING } conduction_state;
+
+typedef struct conduction_parameters {
+    scene_options options;
+    int dimension;        /* 2 or 3 */
+    int n;                /* spacings a side of 1 m, the centre at the origin */
+    conduction_motion motion; /* free at rest; all particles held; all particles driven in a rigid rotation */
+    conduction_state state;
+    double amplitude;     /* K */
+    double sigma;         /* m, of the spot at the start */
+    double omega;         /* rad/s */
+    double jitter;        /* share of the spacing */
+    tlsph_material material; /* without expansion */
+} conduction_parameters;
+
+typedef struct conducting_body { scene_body body; conduction_parameters parameters; } conducting_body;
+
+void conduction_default(conduction_parameters *parameters);
+tlsph_result conduction_create(const conduction_parameters *parameters, conducting_body *out, tlsph_error *error);
+/* Exact temperature, K; of the alternating state: the initial one, for ever. */
+double conduction_exact(const conduction_parameters *parameters, const tlsph_real X[3], double t);
+/* Relative L2 error of theta - theta_R now. */
+double conduction_error(const conducting_body *body);
+/* How much of the initial field is left in the inner half: its share in the field now, 1 at the start. */
+double conduction_amplitude(const conducting_body *body);
+
 #endif
