@@ -61,8 +61,8 @@ PROMISES
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
-  [CONDITIONS] [PROJECTION] [RHS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [SELF-TEST]
-  [PREFLIGHT] [VORONOI] [FILL] [REPRODUCING] [LICENCE]
+  [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION]
+  [SELF-TEST] [PREFLIGHT] [VORONOI] [FILL] [REPRODUCING] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -114,6 +114,7 @@ extern "C" {
     X(TLSPH_ERROR_INVERSION, "a particle turned inside out: its Jacobian is not positive")                              \
     X(TLSPH_ERROR_TEMPERATURE, "a temperature is not positive")                                                         \
     X(TLSPH_ERROR_TIME_STEP, "the time step is not positive or has collapsed")                                          \
+    X(TLSPH_ERROR_CONVERGENCE, "the pressure iteration did not converge")                                          \
     X(TLSPH_ERROR_FIELD, "the scene has no such field, or it cannot be written")                                        \
     X(TLSPH_ERROR_SURFACE, "a surface is not closed, is turned inside out, or does not fit the particles")              \
     X(TLSPH_ERROR_CHECKPOINT, "the data is no checkpoint of this scene, or it is damaged")
@@ -246,7 +247,7 @@ typedef struct tlsph_material {
     tlsph_material_kind kind;
     tlsph_real density;               /* rho_R, kg/m^3, > 0 */
     tlsph_real young;                 /* E, Pa, > 0; for TLSPH_USER the scale of stiffness */
-    tlsph_real poisson;               /* nu, in (-1, 0.5) */
+    tlsph_real poisson;               /* nu, in (-1, 0.5); 0.5 itself with TLSPH_INCOMPRESSIBLE only */
     tlsph_real expansion;             /* linear thermal expansion alpha, 1/K, >= 0 */
     tlsph_real specific_heat;         /* C_v per mass, J/(kg K), > 0 in thermal scenes */
     tlsph_real conductivity;          /* h, W/(m K), >= 0 */
@@ -346,6 +347,34 @@ typedef struct tlsph_allocator {
 typedef void (*tlsph_task_fn)(void *arg, size_t i);
 typedef void (*tlsph_run_fn)(void *user, tlsph_task_fn task, void *arg, size_t count);
 
+/* How the bulk is treated. */
+typedef enum tlsph_scheme {
+    TLSPH_EXPLICIT,      /* pressure from the material; the step follows the p speed; poisson below 0.5; default */
+    TLSPH_INCOMPRESSIBLE /* pressure solved for in each stage (001 section 5); the step follows the s speed; poisson up to
+                            and including 0.5. Isothermal, linear or neo-Hookean, {p,F} or {p,F,H}, TLSPH_RK2, no walls.
+                            Initial velocities should be free of divergence, and written F have determinant 1 */
+} tlsph_scheme;
+typedef enum tlsph_pressure_iteration {
+    TLSPH_CONJUGATE_GRADIENTS, /* default */
+    TLSPH_DUAL_TIME            /* pseudo-time steps (001-52, 53): some ten times as many iterations; for comparison */
+} tlsph_pressure_iteration;
+/* What a scene with TLSPH_INCOMPRESSIBLE may choose. Iterations beyond the limit end in ERROR_CONVERGENCE. */
+typedef struct tlsph_incompressible {
+    tlsph_pressure_iteration iteration;
+    int laplacian_as_printed;    /* 1: plain Laplacian (001-58); default 0: of reconstructed jumps, zero for linear p */
+    tlsph_real laplacian;        /* alpha of (001-54), default 0.25; 0 leaves checkerboards of p undetermined */
+    tlsph_real tolerance;        /* largest volume strain a step may miss, default 1e-6 (float: 1e-5) */
+    int iteration_limit;         /* a stage, default 1000 */
+    tlsph_real pseudo_modulus;   /* dual time: gamma of (001-48b) over mu, default 50 */
+} tlsph_incompressible;
+/* How the last step's two pressure solutions went (see tlsph_pressure_report_read). */
+typedef struct tlsph_pressure_report {
+    int iterations[2];           /* of each stage */
+    double residual[2], tolerance; /* volume strain of the step that each stage's solution misses, largest of a particle */
+    uint64_t iterations_total;   /* since creation */
+    double volume_error;         /* largest |det F - 1 - p/kappa| now */
+} tlsph_pressure_report;
+
 /* A scene. Make it with tlsph_desc_default, then set what differs. */
 typedef struct tlsph_desc {
     uint32_t cookie;
@@ -374,6 +403,8 @@ typedef struct tlsph_desc {
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
     int projection;                      /* 1: angular-momentum projection (000-79 to 82); default 1 */
     tlsph_integrator integrator;         /* default TLSPH_RK2 */
+    tlsph_scheme scheme;                 /* default TLSPH_EXPLICIT */
+    tlsph_incompressible incompressible; /* for TLSPH_INCOMPRESSIBLE */
     tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1], see tlsph_cfl_limit */
     tlsph_step_rule step_rule;           /* default TLSPH_STEP_BY_PARTICLE */
     int retries;                         /* what a step does that inverts a particle or meets a temperature below zero:
@@ -673,6 +704,8 @@ TLSPH_API const char *tlsph_hint_text(tlsph_hint hint);
 /* All zero where the operator is not TLSPH_CLOSED. */
 TLSPH_API void tlsph_closure_read(const tlsph_solver *solver, tlsph_closure *closure);
 TLSPH_API void tlsph_ledger_read(const tlsph_solver *solver, tlsph_ledger *ledger);
+/* ERROR_FIELD without TLSPH_INCOMPRESSIBLE. */
+TLSPH_API tlsph_result tlsph_pressure_report_read(const tlsph_solver *solver, tlsph_pressure_report *report);
 /* Starts the cumulative entries anew from the current state. */
 TLSPH_API void tlsph_ledger_reset(tlsph_solver *solver);
 
@@ -2299,7 +2332,8 @@ typedef struct tlsphi_material {
     int entropic;                       /* MEE: psi and u sit in the entropy */
     tlsph_real rho, c_v, theta_R, h;    /* kg/m^3, J/(m^3 K), K, W/(m K) */
     tlsph_real zeta, gamma, k, beta, q; /* Pa, Pa, Pa, Pa/K, 1 */
-    tlsph_real mu, kappa;               /* Pa */
+    tlsph_real mu, kappa;               /* Pa; kappa = k = 0 in the incompressible scheme, which has instead: */
+    tlsph_real compressibility;         /* 1/kappa, 1/Pa */
     tlsph_real c_linear;                /* p speed of the undeformed body at constant temperature, m/s */
     tlsph_real yield, hardening, heating; /* Pa, Pa, 1 */
     tlsph_response_fn response;
@@ -2625,7 +2659,8 @@ static void tlsphi_store_plastic(int dim, int thermal, const tlsphi_plastic *pla
 }
 
 /* The first constant out of range, or NULL. */
-static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, double *value, const char **allowed) {
+static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, int incompressible, double *value,
+                                         const char **allowed) {
     const struct {
         const char *name;
         tlsph_real value;
@@ -2635,7 +2670,8 @@ static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, d
     } range[] = {
         {"density", m->density, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
         {"young", m->young, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
-        {"poisson", m->poisson, -1, 0.5, 1, 1, "between -1 and 0.5, both excluded"},
+        {"poisson", m->poisson, -1, 0.5, 1, !incompressible,
+         "between -1 and 0.5, both excluded; 0.5 with TLSPH_INCOMPRESSIBLE"},
         {"expansion", m->expansion, 0, TLSPHI_LARGEST, 0, 1, "0 or more"},
         {"conductivity", m->conductivity, 0, TLSPHI_LARGEST, 0, 1, "0 or more"},
         {"reference_temperature", m->reference_temperature, 0, TLSPHI_LARGEST, 1, 1, "more than 0"},
@@ -2660,6 +2696,8 @@ static const char *tlsphi_material_fault(const tlsph_material *m, int thermal, d
     *value = (double)m->kind;
     *allowed = "a tlsph_material_kind; TLSPH_USER with a response function";
     if ((unsigned)m->kind > (unsigned)TLSPH_USER || (m->kind == TLSPH_USER && !m->response)) return "kind";
+    *allowed = "linear or neo-Hookean with TLSPH_INCOMPRESSIBLE";
+    if (incompressible) return m->kind == TLSPH_LINEAR || m->kind == TLSPH_NEO_HOOKEAN ? NULL : "kind";
     const tlsphi_material c = tlsphi_calibrate(m);
     *value = (double)c.k;
     *allowed = "more than 0: kappa - 3 kappa alpha theta_R (1 - q); lower alpha or raise q";
@@ -2671,7 +2709,7 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
     double value;
     const char *allowed;
     if (!material || !F || !out) return TLSPH_ERROR_ARGUMENT;
-    if (tlsphi_material_fault(material, 0, &value, &allowed)) return TLSPH_ERROR_MATERIAL;
+    if (tlsphi_material_fault(material, 0, 0, &value, &allowed)) return TLSPH_ERROR_MATERIAL;
     if (!tlsphi_all_finite(F, 9) || !tlsphi_finite(theta)) return TLSPH_ERROR_NOT_FINITE;
     if (!(theta > 0)) return TLSPH_ERROR_TEMPERATURE;
     const tlsphi_material m = tlsphi_calibrate(material);
@@ -2723,6 +2761,7 @@ typedef struct tlsphi_state {
     tlsph_real *x, *p, *F; /* D, D, DD */
     tlsph_real *H, *J, *E; /* DD, 1, 1 (E or eta); optional */
     tlsph_real *plastic;   /* tlsphi_plastic_reals; optional */
+    tlsph_real *q;         /* 1: pressure of the incompressible scheme (tension positive); optional */
 } tlsphi_state;
 
 enum {
@@ -2777,8 +2816,16 @@ typedef struct tlsphi_body {
     double axis[3];
     double v_mean[3], spin[3];            /* rigid motion nearest to v */
     double lambda[3], linear[3];          /* multipliers of the projection */
+    int closed;                           /* incompressible: its whole surface is held, so that the mean pressure is free */
+    double shift;
     double debt[3];                       /* torque that earlier stages owe to the step, see [PROJECTION] */
 } tlsphi_body;
+
+/* Work arrays of [INCOMPRESSIBLE]. */
+typedef struct tlsphi_pressure {
+    tlsph_real *A, *a, *slope, *back, *velocity;                 /* DD, D, D, D, D */
+    tlsph_real *b, *diagonal, *compact, *q, *r, *z, *p, *Sp;     /* 1 each */
+} tlsphi_pressure;
 
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user, has_plastic;
@@ -2805,6 +2852,12 @@ struct tlsph_solver {
     /* state, and the state at the beginning of the step */
     tlsphi_state now, old;
     tlsph_real *now_memory, *old_memory;
+    /* incompressible scheme */
+    int incompressible;
+    tlsph_incompressible choice;
+    tlsph_real laplacian_share;
+    tlsphi_pressure pressure;
+    tlsph_pressure_report report;
     size_t state_reals;
     /* rates per reference volume */
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
@@ -2965,6 +3018,10 @@ static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state 
     if (!tlsphi_finite(theta)) return TLSPH_ERROR_NOT_FINITE;
     if (!(theta > 0)) return TLSPH_ERROR_TEMPERATURE;
     pt->p = pt->r.e_J - theta * pt->r.eta_J;
+    if (u->q) {
+        pt->p = u->q[a];
+        pt->r.energy += m->compressibility * pt->p * pt->p / 2;
+    }
     for (int i = 0; i < 9; i++) pt->P[i] = pt->r.e_F[i] - theta * pt->r.eta_F[i] + pt->p * pt->H[i];
     pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta / m->theta_R : 1);
     pt->c_p = tlsphi_sqrt(tlsphi_max(pt->r.p_modulus[0] + theta * pt->r.p_modulus[1], 0) / m->rho);
@@ -4333,6 +4390,384 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
     tlsphi_apply_loads(s, stage, dt);
 }
 
+/* ==== [INCOMPRESSIBLE] =============================================================================================
+   Fractional step of 001 section 5 for bulk moduli up to infinity. F and the deviatoric stresses advance explicitly, then
+   the pressure increment q of the stage is found, with which the momentum at the end of the stage,
+     p = p_int + w T[q]/V,   T_a[q] = sum_b (q_a A_a + q_b A_b) g_ab/2,   A = H M,                          (001-45a)
+   meets, with d = det F and w the weight of the stage's forces (dt, then dt/2),
+     V (d + T div v) = V (1 + (p + q)/kappa) + alpha T^2 R(p + q),  V_a div_a v = sum_b (v_b - v_a)/2 . A_a g_ab,  (001-47)
+   (49) with "= 0" and (50) with its dt where it belongs. Departures: the volume that a step of T would lead to, d + T div v,
+   stands where (42) has the increment of the pressure, so that det F - 1 cannot accumulate: it stays of third order in the
+   step. T is the stable step, also in a shorter one: there, what is left of det F - 1 would be corrected by a blow.
+   And H is that of x^n in the first stage, of x^{n+1} in the last: there T[q] has no torque, so that angular momentum
+   stays exact; what H gains during the first stage is known, (H* - H) : grad v^n, and goes to the right-hand side.
+
+   R is the Laplacian of (54)-(58), k_ab = |c|^2/(rho C.d), without which checkerboards of p are invisible. As printed it
+   takes jumps p_b - p_a, and what it takes from div v is of first order at boundaries. By default the jumps are those that
+   remain when the linear part (grad p_a + grad p_b).d/2 is taken away; R is the derivative of sum k jump^2/4, symmetric.
+
+   The system S q = b, S = V/(kappa T) + w B V^-1 B^T/rho + alpha T R, is symmetric and positive: conjugate gradients with
+   its diagonal as preconditioner. The dual time steps of (48), (52), (53) are there for comparison: v and q in turn, like
+   a damped wave of speed sqrt(gamma/rho), point-implicit in what only damps. Bodies whose whole surface is held leave the
+   mean of p free: it is set to zero, and the mean of b, by which the held velocities change the volume, spread evenly. */
+
+typedef struct tlsphi_solution {
+    tlsph_solver *s;
+    double w, T;
+    int first_stage, gradient;  /* gradient: R needs grad p */
+    const tlsph_real *f, *vector; /* operands of the tasks below */
+    tlsph_real *out, factor, *add_to;
+    const tlsph_real *dot_a, *dot_b;
+} tlsphi_solution;
+
+/* A, the part of b that does not depend on momentum, 1/kappa; diagonal of S and mass for the preconditioner. */
+static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
+    const tlsphi_solution *q = (const tlsphi_solution *)arg;
+    tlsph_solver *s = q->s;
+    const size_t D = (size_t)s->dim, dd = D * D;
+    for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
+        const tlsphi_material *m = tlsphi_material_of(s, a);
+        tlsphi_point pt, next;
+        tlsph_real H[9], gain = 0;
+        tlsphi_load_measures(s, q->first_stage ? &s->old : &s->now, m, a, &pt);
+        tlsphi_shrink(s->dim, pt.H, H);
+        tlsphi_mirror_all(s, a, H);
+        if (s->M) tlsphi_product(s->dim, H, s->M + dd * a, s->pressure.A + dd * a);
+        else memcpy(s->pressure.A + dd * a, H, dd * sizeof *H);
+        if (q->first_stage) {
+            tlsphi_load_measures(s, &s->now, m, a, &next);
+            for (int k = 0; k < 9; k++) next.H[k] -= pt.H[k];
+            tlsphi_shrink(s->dim, next.H, H);
+            gain = tlsphi_dot((int)dd, H, s->rate_F + dd * a);
+        }
+        s->pressure.b[a] = s->V[a] * ((pt.d - 1) / (tlsph_real)q->T + gain);
+        for (size_t k = 0; k < D; k++) s->v[D * a + k] = s->now.p[D * a + k] / m->rho;
+    }
+}
+/* k_ab of R */
+TLSPHI_INLINE tlsph_real tlsphi_pressure_pair(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g,
+                                              const int dim, tlsph_real *d) {
+    const size_t D = (size_t)dim, dd = D * D;
+    tlsph_real c[3], C[3];
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
+    tlsphi_multiply_mean(dim, s->pressure.A + dd * a, s->pressure.A + dd * b, g, c);
+    if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, C);
+    const tlsph_real Cd = tlsphi_dot(dim, s->M ? C : g, d), rho = (s->wave[4 * a + 2] + s->wave[4 * b + 2]) / 2;
+    return Cd > 0 ? tlsphi_dot(dim, c, c) / (rho * Cd) : 0;
+}
+TLSPHI_INLINE void tlsphi_pressure_diagonal(tlsph_solver *s, const tlsphi_solution *q, size_t a, const int dim) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real T = (tlsph_real)q->T;
+    tlsph_real wide = 0, compact = 0, sum[3] = {0}, Ag[3], d[3];
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        tlsphi_multiply(dim, s->pressure.A + dd * a, s->g + D * k, Ag);
+        for (size_t j = 0; j < D; j++) sum[j] += Ag[j];
+        wide += tlsphi_dot(dim, Ag, Ag) / (4 * s->wave[4 * b + 2] * s->V[b]);
+        compact += tlsphi_pressure_pair(s, a, b, s->g + D * k, dim, d);
+    }
+    wide += tlsphi_dot(dim, sum, sum) / (4 * s->wave[4 * a + 2] * s->V[a]);
+    s->pressure.compact[a] = s->V[a] * tlsphi_material_of(s, a)->compressibility / T + s->laplacian_share * T * compact;
+    s->pressure.diagonal[a] = s->pressure.compact[a] + (tlsph_real)q->w * wide;
+}
+static void tlsphi_pressure_diagonal_task(void *arg, size_t i) {
+    const tlsphi_solution *q = (const tlsphi_solution *)arg;
+    for (size_t a = q->s->block[i].begin; a < q->s->block[i].end; a++) {
+        if (q->s->dim == 3) tlsphi_pressure_diagonal(q->s, q, a, 3);
+        else tlsphi_pressure_diagonal(q->s, q, a, 2);
+    }
+}
+/* out = T[f]/(rho V), and grad f. */
+TLSPHI_INLINE void tlsphi_pressure_force(const tlsph_solver *s, const tlsphi_solution *q, size_t a, const int dim) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real *f = q->f, *A = s->pressure.A;
+    tlsph_real T[3] = {0}, slope[3] = {0};
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        const tlsph_real *g = s->g + D * k, f_a = f[a] / 2, f_b = f[b] / 2, jump = f_b - f_a;
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
+            TLSPHI_UNROLL for (int j = 0; j < dim; j++) T[i] +=
+                (f_a * A[dd * a + (size_t)(dim * i + j)] + f_b * A[dd * b + (size_t)(dim * i + j)]) * g[j];
+            slope[i] += jump * g[i];
+        }
+    }
+    const tlsph_real inverse = 1 / s->V[a], rho = s->wave[4 * a + 2];
+    for (size_t i = 0; i < D; i++) {
+        q->out[D * a + i] = T[i] * inverse / rho;
+        slope[i] *= inverse;
+    }
+    if (!q->gradient) return;
+    tlsphi_store_slope(s, a, dim, slope, s->pressure.slope + D * a);
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
+        if (!m->tangent) tlsphi_mirror_vector(dim, m, s->pressure.slope + D * a);
+}
+static void tlsphi_pressure_force_task(void *arg, size_t i) {
+    const tlsphi_solution *q = (const tlsphi_solution *)arg;
+    for (size_t a = q->s->block[i].begin; a < q->s->block[i].end; a++) {
+        if (q->s->dim == 3) tlsphi_pressure_force(q->s, q, a, 3);
+        else tlsphi_pressure_force(q->s, q, a, 2);
+    }
+}
+/* out = V f/(kappa T) - factor V div(vector) + alpha T (R f without the adjoint of its gradients, which follows). */
+TLSPHI_INLINE void tlsphi_pressure_balance(tlsph_solver *s, const tlsphi_solution *q, size_t a, const int dim) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real *slope = s->pressure.slope, *A = s->pressure.A + dd * a, *vector = q->vector;
+    tlsph_real divergence = 0, direct = 0, back[3] = {0}, d[3];
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        const tlsph_real *g = s->g + D * k, conductance = tlsphi_pressure_pair(s, a, b, g, dim, d);
+        tlsph_real jump = q->f[b] - q->f[a];
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
+            tlsph_real Ag = 0;
+            TLSPHI_UNROLL for (int j = 0; j < dim; j++) Ag += A[dim * i + j] * g[j];
+            divergence += (vector[D * b + (size_t)i] - vector[D * a + (size_t)i]) * Ag / 2;
+        }
+        if (q->gradient) TLSPHI_UNROLL for (int i = 0; i < dim; i++) jump -=
+            (slope[D * a + (size_t)i] + slope[D * b + (size_t)i]) * d[i] / 2;
+        direct -= conductance * jump;
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) back[i] -= conductance * jump * d[i] / 2;
+    }
+    q->out[a] = s->V[a] * tlsphi_material_of(s, a)->compressibility / (tlsph_real)q->T * q->f[a] -
+                q->factor * divergence + s->laplacian_share * (tlsph_real)q->T * direct;
+    if (!q->gradient) return;
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
+        if (!m->tangent) tlsphi_mirror_vector(dim, m, back);
+    if (s->M) tlsphi_multiply_transposed(dim, s->M + dd * a, back, s->pressure.back + D * a);
+    else memcpy(s->pressure.back + D * a, back, D * sizeof *back);
+    for (size_t i = D * a; i < D * (a + 1); i++) s->pressure.back[i] /= 2 * s->V[a];
+}
+static void tlsphi_pressure_balance_task(void *arg, size_t i) {
+    const tlsphi_solution *q = (const tlsphi_solution *)arg;
+    for (size_t a = q->s->block[i].begin; a < q->s->block[i].end; a++) {
+        if (q->s->dim == 3) tlsphi_pressure_balance(q->s, q, a, 3);
+        else tlsphi_pressure_balance(q->s, q, a, 2);
+    }
+}
+/* The adjoint of the gradients in R: -sum_b (back_a + back_b).g_ab */
+static void tlsphi_pressure_adjoint_task(void *arg, size_t i) {
+    const tlsphi_solution *q = (const tlsphi_solution *)arg;
+    const tlsph_solver *s = q->s;
+    const size_t D = (size_t)s->dim;
+    for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
+        tlsph_real sum = 0;
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++)
+            for (size_t j = 0; j < D; j++)
+                sum -= (s->pressure.back[D * a + j] + s->pressure.back[D * s->neighbour[k] + j]) * s->g[D * k + j];
+        q->out[a] += s->laplacian_share * (tlsph_real)q->T * sum;
+    }
+}
+/* Fixed directions and driven components take no acceleration from the pressure. */
+static void tlsphi_pressure_hold(const tlsph_solver *s, tlsph_real *vector) {
+    const size_t D = (size_t)s->dim;
+    for (size_t i = 0; i < s->loads; i++) {
+        const tlsphi_load *load = s->load + i;
+        for (size_t j = 0; load->given.kind == TLSPH_VELOCITY && j < load->given.count; j++) {
+            tlsph_real part[3], *at = vector + D * load->inner[j];
+            tlsphi_driven_part(s->dim, &load->given, at, part);
+            for (size_t k = 0; k < D; k++) at[k] -= part[k];
+        }
+    }
+    for (size_t i = 0; i < s->fixes; i++) {
+        tlsph_real *at = vector + D * s->fix[i].particle;
+        const tlsph_real along = tlsphi_dot(s->dim, at, s->fix[i].e);
+        for (size_t k = 0; k < D; k++) at[k] -= along * s->fix[i].e[k];
+    }
+}
+static void tlsphi_pressure_accelerate(tlsphi_solution *q, const tlsph_real *f, tlsph_real *out) {
+    q->f = f;
+    q->out = out;
+    tlsphi_run_tasks(q->s, tlsphi_pressure_force_task, q);
+    tlsphi_pressure_hold(q->s, out);
+}
+/* out = S f with the divergence of `vector` times `factor`; grad f is that of the last tlsphi_pressure_accelerate. */
+static void tlsphi_pressure_terms(tlsphi_solution *q, const tlsph_real *f, const tlsph_real *vector, double factor,
+                                  tlsph_real *out) {
+    q->f = f;
+    q->vector = vector;
+    q->factor = (tlsph_real)factor;
+    q->out = out;
+    tlsphi_run_tasks(q->s, tlsphi_pressure_balance_task, q);
+    if (q->gradient) tlsphi_run_tasks(q->s, tlsphi_pressure_adjoint_task, q);
+}
+static void tlsphi_pressure_apply(tlsphi_solution *q, const tlsph_real *f, tlsph_real *out) {
+    tlsphi_pressure_accelerate(q, f, q->s->pressure.a);
+    tlsphi_pressure_terms(q, f, q->s->pressure.a, q->w, out);
+}
+/* Sums of a block: a.b, largest |a| T/V. */
+static void tlsphi_pressure_sums_task(void *arg, size_t i) {
+    const tlsphi_solution *q = (const tlsphi_solution *)arg;
+    tlsphi_block *block = q->s->block + i;
+    double sum = 0, most = 0;
+    for (size_t a = block->begin; a < block->end; a++) {
+        const double value = fabs((double)q->dot_a[a]) * q->T / (double)q->s->V[a];
+        sum += (double)q->dot_a[a] * (double)q->dot_b[a];
+        if (!(value <= most)) most = value; /* NaN too */
+    }
+    block->moments[0] = sum;
+    block->moments[1] = most;
+}
+static double tlsphi_pressure_dot(tlsphi_solution *q, const tlsph_real *a, const tlsph_real *b, double *most) {
+    double sum = 0, largest = 0;
+    q->dot_a = a;
+    q->dot_b = b;
+    tlsphi_run_tasks(q->s, tlsphi_pressure_sums_task, q);
+    for (size_t i = 0; i < q->s->blocks; i++) {
+        sum += q->s->block[i].moments[0];
+        if (!(q->s->block[i].moments[1] <= largest)) largest = q->s->block[i].moments[1];
+    }
+    if (most) *most = largest;
+    return sum;
+}
+
+/* Bodies in which a constant pressure does nothing: is S 1 round-off beside the diagonal? */
+static void tlsphi_pressure_closed(tlsphi_body *body, const double *m) {
+    body->closed = m[1] <= 1e4 * TLSPHI_EPSILON * m[2];
+    body->shift = body->closed ? m[3] / m[0] : 0;
+}
+/* Sums V | |S 1| | diagonal | values, or V q, and takes the mean of values away from closed bodies. */
+static void tlsphi_pressure_level(tlsphi_solution *q, tlsph_real *values, int by_volume) {
+    tlsph_solver *s = q->s;
+    for (size_t i = 0; i < s->blocks; i++) {
+        double *m = s->block[i].moments;
+        m[0] = m[1] = m[2] = m[3] = 0;
+        for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
+            m[0] += (double)s->V[a];
+            m[1] += fabs((double)s->pressure.Sp[a]);
+            m[2] += (double)s->pressure.diagonal[a];
+            m[3] += (by_volume ? (double)s->V[a] : 1) * (double)values[a];
+        }
+    }
+    tlsphi_each_body(s, tlsphi_pressure_closed);
+    for (size_t i = 0; i < s->blocks; i++)
+        for (size_t a = s->block[i].begin; a < s->block[i].end; a++)
+            values[a] -= (tlsph_real)(s->body[s->block[i].body].shift * (by_volume ? 1 : (double)s->V[a]));
+}
+
+/* S q = b from q = 0; r holds b and ends as the residual. Returns the iterations, or -1. */
+static int tlsphi_pressure_conjugate(tlsphi_solution *q, double *residual) {
+    tlsph_solver *s = q->s;
+    tlsphi_pressure *const u = &s->pressure;
+    double rz = 0, most = 0;
+    (void)tlsphi_pressure_dot(q, u->r, u->r, &most);
+    for (int it = 0;; it++) {
+        *residual = most;
+        if (most <= (double)s->choice.tolerance) return it;
+        if (it >= s->choice.iteration_limit || !(most < TLSPHI_LARGEST)) return -1;
+        for (size_t a = 0; a < s->n; a++) u->z[a] = u->r[a] / u->diagonal[a];
+        const double next = tlsphi_pressure_dot(q, u->r, u->z, NULL), beta = it ? next / rz : 0;
+        for (size_t a = 0; a < s->n; a++) u->p[a] = u->z[a] + (tlsph_real)beta * u->p[a];
+        rz = next;
+        tlsphi_pressure_apply(q, u->p, u->Sp);
+        const double curvature = tlsphi_pressure_dot(q, u->p, u->Sp, NULL);
+        if (!(curvature > 0)) return -1;
+        const tlsph_real step = (tlsph_real)(rz / curvature);
+        for (size_t a = 0; a < s->n; a++) {
+            u->q[a] += step * u->p[a];
+            u->r[a] -= step * u->Sp[a];
+        }
+        (void)tlsphi_pressure_dot(q, u->r, u->r, &most);
+    }
+}
+/* (001-52), (53) in pseudo-time: momentum, then pressure. The velocity of the iteration is kept in `drift` as its
+   difference from p_int/rho + w T[q]/(rho V), which the converged solution has. */
+static int tlsphi_pressure_dual_time(tlsphi_solution *q, double *residual) {
+    tlsph_solver *s = q->s;
+    tlsphi_pressure *const u = &s->pressure;
+    const size_t D = (size_t)s->dim;
+    double slowest = 0, most = 0;
+    for (size_t a = 0; a < s->n; a++) { /* the wide part of the diagonal over V is (pseudo frequency/2)^2 or more */
+        const double mu = (double)tlsphi_material_of(s, a)->mu * (double)s->choice.pseudo_modulus;
+        const double wide = (double)(u->diagonal[a] - u->compact[a]) / (q->w * (double)s->V[a]);
+        slowest = tlsphi_dmax(slowest, sqrt(mu * wide));
+    }
+    const double step = 0.7 / slowest, keep = 1 / (1 + step / q->w);
+    memset(u->velocity, 0, D * s->n * sizeof *u->velocity); /* change from v_int */
+    for (int it = 0;; it++) {
+        tlsphi_pressure_accelerate(q, u->q, u->a);
+        for (size_t i = 0; i < D * s->n; i++) /* the true residual S q - b needs w a, the iteration its own velocity */
+            u->velocity[i] = (tlsph_real)(keep * ((double)u->velocity[i] + step * (double)u->a[i]));
+        tlsphi_pressure_terms(q, u->q, u->a, q->w, u->Sp);
+        for (size_t a = 0; a < s->n; a++) u->z[a] = u->r[a] - u->Sp[a];
+        (void)tlsphi_pressure_dot(q, u->z, u->z, &most);
+        *residual = most;
+        if (most <= (double)s->choice.tolerance) return it;
+        if (it >= s->choice.iteration_limit || !(most < TLSPHI_LARGEST)) return -1;
+        tlsphi_pressure_terms(q, u->q, u->velocity, 1, u->Sp);
+        for (size_t a = 0; a < s->n; a++) {
+            const double rate = step * (double)tlsphi_material_of(s, a)->mu * (double)s->choice.pseudo_modulus / (double)s->V[a];
+            u->q[a] += (tlsph_real)(rate * (double)(u->r[a] - u->Sp[a]) / (1 + rate * (double)u->compact[a]));
+        }
+    }
+}
+
+/* The pressure of a stage and the momentum that goes with it. */
+static tlsph_result tlsphi_pressure_solve(tlsph_solver *s, const tlsphi_stage *stage, int number, double dt) {
+    tlsphi_solution q;
+    tlsphi_pressure *const u = &s->pressure;
+    const size_t D = (size_t)s->dim;
+    memset(&q, 0, sizeof q);
+    q.s = s;
+    q.T = tlsphi_dmax(dt, (double)tlsph_stable_time_step(s));
+    q.w = stage->c * dt;
+    q.first_stage = number == 0;
+    q.gradient = !s->choice.laplacian_as_printed && s->laplacian_share > 0;
+    tlsphi_run_tasks(s, tlsphi_pressure_prepare_task, &q);
+    tlsphi_run_tasks(s, tlsphi_pressure_diagonal_task, &q);
+    tlsphi_pressure_accelerate(&q, s->now.q, u->a); /* for its gradient */
+    tlsphi_pressure_terms(&q, s->now.q, s->v, 1, u->r);
+    for (size_t a = 0; a < s->n; a++) {
+        u->r[a] = u->b[a] - u->r[a];
+        u->q[a] = 0;
+        u->z[a] = 1;
+    }
+    tlsphi_pressure_apply(&q, u->z, u->Sp);
+    tlsphi_pressure_level(&q, u->r, 0);
+    double residual = 0;
+    const int iterations = s->choice.iteration == TLSPH_DUAL_TIME ? tlsphi_pressure_dual_time(&q, &residual)
+                                                                  : tlsphi_pressure_conjugate(&q, &residual);
+    s->report.iterations[number] = iterations < 0 ? s->choice.iteration_limit : iterations;
+    s->report.iterations_total += (uint64_t)s->report.iterations[number];
+    s->report.residual[number] = residual;
+    if (iterations < 0) {
+        tlsphi_fail(&s->error, TLSPH_ERROR_CONVERGENCE, "step", "volume strain that the pressure misses", TLSPH_NO_PARTICLE,
+                    residual, (double)s->choice.tolerance,
+                    "at most incompressible.tolerance within iteration_limit; raise the limit, alpha or the tolerance");
+        s->error.time = s->time;
+        s->error.step = s->step;
+        return TLSPH_ERROR_CONVERGENCE;
+    }
+    tlsphi_pressure_accelerate(&q, u->q, u->a);
+    for (size_t a = 0; a < s->n; a++) {
+        const double mass = q.w * (double)tlsphi_material_of(s, a)->rho;
+        s->now.q[a] += u->q[a];
+        for (size_t i = D * a; i < D * (a + 1); i++) s->now.p[i] += (tlsph_real)(mass * (double)u->a[i]);
+    }
+    for (size_t i = 0; i < s->bodies; i++) /* level p of closed bodies: as found above, by what S 1 was */
+        if (s->body[i].closed) q.first_stage = -1;
+    if (q.first_stage < 0) {
+        for (size_t a = 0; a < s->n; a++) u->z[a] = 1;
+        tlsphi_pressure_apply(&q, u->z, u->Sp);
+        tlsphi_pressure_level(&q, s->now.q, 1);
+    }
+    return TLSPH_OK;
+}
+
+TLSPHI_DEF tlsph_result tlsph_pressure_report_read(const tlsph_solver *s, tlsph_pressure_report *report) {
+    if (!report) return TLSPH_ERROR_ARGUMENT;
+    if (!s->now.q) return TLSPH_ERROR_FIELD;
+    *report = s->report;
+    report->tolerance = (double)s->choice.tolerance;
+    report->volume_error = 0;
+    for (size_t a = 0; a < s->n; a++) {
+        const tlsphi_material *m = tlsphi_material_of(s, a);
+        tlsphi_point pt;
+        tlsphi_load_measures(s, &s->now, m, a, &pt);
+        report->volume_error =
+            tlsphi_dmax(report->volume_error, fabs((double)(pt.d - 1 - s->now.q[a] * m->compressibility)));
+    }
+    return TLSPH_OK;
+}
+
 /* ==== [STEP] =======================================================================================================
    Runge-Kutta schemes as tables, geometry in the same scheme.
 
@@ -4475,6 +4910,10 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
         tlsphi_evolve(s, stage, dt);                  /* (6) u = a u_old + b u + c dt L       */
         if (s->now.plastic) tlsphi_run(s, tlsphi_flow_block);
         tlsphi_impose(s, stage, dt);                  /* (7) constraints                      */
+        if (s->incompressible && tlsphi_pressure_solve(s, stage, k, dt)) {
+            tlsphi_restore_state(s);
+            return s->error.result;
+        }
         const tlsphi_block *bad = tlsphi_evaluate(s); /* (8) stress, (9) temperature          */
         if (bad) {
             const tlsph_result result = tlsphi_describe_failure(s, bad, "step");
@@ -4890,12 +5329,13 @@ static tlsph_real tlsphi_get_real(const unsigned char **at) {
 }
 
 /* The state arrays with their components, in the order of the checkpoint. */
-static int tlsphi_state_arrays(const tlsph_solver *s, tlsph_real *array[7], size_t components[7]) {
+static int tlsphi_state_arrays(const tlsph_solver *s, tlsph_real *array[8], size_t components[8]) {
     const size_t D = (size_t)s->dim;
-    tlsph_real *const all[7] = {s->now.x, s->now.p, s->now.F, s->now.H, s->now.J, s->now.E, s->now.plastic};
-    const size_t sizes[7] = {D, D, D * D, D * D, 1, 1, tlsphi_plastic_reals(s->dim, s->thermal)};
+    tlsph_real *const all[8] = {s->now.x, s->now.p, s->now.F,       s->now.H,
+                                s->now.J, s->now.E, s->now.plastic, s->now.q};
+    const size_t sizes[8] = {D, D, D * D, D * D, 1, 1, tlsphi_plastic_reals(s->dim, s->thermal), 1};
     int count = 0;
-    for (int i = 0; i < 7; i++) {
+    for (int i = 0; i < 8; i++) {
         if (!all[i]) continue;
         array[count] = all[i];
         components[count++] = sizes[i];
@@ -4907,8 +5347,8 @@ TLSPHI_DEF size_t tlsph_save_size(const tlsph_solver *s) {
 }
 TLSPHI_DEF tlsph_result tlsph_save(const tlsph_solver *s, void *buffer, size_t size) {
     unsigned char *at = (unsigned char *)buffer;
-    tlsph_real *array[7];
-    size_t components[7];
+    tlsph_real *array[8];
+    size_t components[8];
     double accounts[TLSPHI_ACCOUNTS];
     if (!buffer) return TLSPH_ERROR_ARGUMENT;
     if (size < tlsph_save_size(s)) return TLSPH_ERROR_SIZE;
@@ -4948,8 +5388,8 @@ static tlsph_result tlsphi_check_checkpoint(tlsph_solver *s, const unsigned char
 }
 TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_t size) {
     const unsigned char *at = (const unsigned char *)buffer;
-    tlsph_real *array[7];
-    size_t components[7];
+    tlsph_real *array[8];
+    size_t components[8];
     double accounts[TLSPHI_ACCOUNTS];
     if (!buffer)
         return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "restore", "buffer", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
@@ -5004,7 +5444,18 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"jump_share", (double)d->jump_share, 0, 100, "0 to 100"},
         {"drift_relaxation", (double)d->drift_relaxation, 0, 100, "0 to 100"},
         {"conduction", (double)d->conduction, TLSPH_COMPACT, TLSPH_DOUBLE_GRADIENT, "a tlsph_conduction"},
-        {"integrator", (double)d->integrator, TLSPH_RK2, TLSPH_RK4_FROZEN, "a tlsph_integrator"},
+        {"integrator", (double)d->integrator, TLSPH_RK2, d->scheme ? TLSPH_RK2 : TLSPH_RK4_FROZEN,
+         "a tlsph_integrator; TLSPH_RK2 with TLSPH_INCOMPRESSIBLE"},
+        {"scheme", (double)d->scheme, TLSPH_EXPLICIT, TLSPH_INCOMPRESSIBLE, "a tlsph_scheme"},
+        {"thermal", (double)d->thermal, TLSPH_ISOTHERMAL, d->scheme ? TLSPH_ISOTHERMAL : TLSPH_ENTROPY,
+         "isothermal with TLSPH_INCOMPRESSIBLE"},
+        {"sharp_gradients", (double)d->sharp_gradients, -1e9, d->scheme ? 0 : 1e9, "0 with TLSPH_INCOMPRESSIBLE"},
+        {"incompressible.iteration", (double)d->incompressible.iteration, TLSPH_CONJUGATE_GRADIENTS, TLSPH_DUAL_TIME,
+         "a tlsph_pressure_iteration"},
+        {"incompressible.laplacian", (double)d->incompressible.laplacian, 0, 1, "0 to 1"},
+        {"incompressible.tolerance", (double)d->incompressible.tolerance, 1e-14, 0.1, "1e-14 to 0.1"},
+        {"incompressible.iteration_limit", (double)d->incompressible.iteration_limit, 1, 1e9, "1 or more"},
+        {"incompressible.pseudo_modulus", (double)d->incompressible.pseudo_modulus, 1e-3, 1e9, "0.001 to 1e9"},
         {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
         {"threads", (double)d->threads, 0, 4096, "0 to 4096"},
         {"particles.spacing", (double)d->particles.spacing, 0, TLSPHI_LARGEST, "0 (from the weights) or more"},
@@ -5019,6 +5470,12 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
             tlsphi_check_range(plan, range[i].name, range[i].value, range[i].low, range[i].high, range[i].allowed);
         if (r) return r;
     }
+    if (d->scheme == TLSPH_INCOMPRESSIBLE && (d->unknowns == TLSPH_PFJ || d->unknowns == TLSPH_PFHJ))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "unknowns", TLSPH_NO_PARTICLE, (double)d->unknowns, 0,
+                                "TLSPH_PF or TLSPH_PFH with TLSPH_INCOMPRESSIBLE, where the pressure replaces J");
+    if (d->scheme == TLSPH_INCOMPRESSIBLE && tlsphi_needs_bonds(d))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "operator", TLSPH_NO_PARTICLE, (double)d->operator_kind, 0,
+                                "plain corrected kernels, cells or given pairs with TLSPH_INCOMPRESSIBLE");
     const int pointers = d->materials && d->particles.positions &&
                          (d->particles.volumes || d->operator_kind == TLSPH_CELLS) &&
                          (!d->condition_count || d->conditions) &&
@@ -5063,8 +5520,9 @@ static tlsph_result tlsphi_check_particles(tlsphi_plan *plan) {
 static tlsph_result tlsphi_check_materials(tlsphi_plan *plan) {
     for (size_t i = 0; i < plan->desc->material_count; i++) {
         double value;
-        const char *allowed, *fault = tlsphi_material_fault(plan->desc->materials + i,
-                                                            plan->desc->thermal != TLSPH_ISOTHERMAL, &value, &allowed);
+        const char *allowed, *fault =
+            tlsphi_material_fault(plan->desc->materials + i, plan->desc->thermal != TLSPH_ISOTHERMAL,
+                                  plan->desc->scheme == TLSPH_INCOMPRESSIBLE, &value, &allowed);
         if (fault) return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, fault, TLSPH_NO_PARTICLE, value, 0, allowed);
     }
     return TLSPH_OK;
@@ -5093,6 +5551,9 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
     if (plane && !(NN > 0))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "normal", TLSPH_NO_PARTICLE, (double)NN, 0,
                                 "not zero for this kind");
+    if (c->kind == TLSPH_WALL && plan->desc->scheme == TLSPH_INCOMPRESSIBLE)
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
+                                "no walls with TLSPH_INCOMPRESSIBLE");
     if (tlsphi_is_thermal(c->kind) && !plan->desc->thermal)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
                                 "no heat in an isothermal scene");
@@ -5261,6 +5722,9 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->drift_relaxation = d->drift_relaxation;
     s->cfl = d->cfl;
     s->integrator = d->integrator;
+    s->incompressible = d->scheme == TLSPH_INCOMPRESSIBLE;
+    s->choice = d->incompressible;
+    s->laplacian_share = d->incompressible.laplacian;
     s->frozen = d->integrator >= TLSPH_RK3_FROZEN && d->dissipation != TLSPH_NO_DISSIPATION;
     s->damps = 1;
     s->bonds = plan->bond != NULL;
@@ -5292,6 +5756,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
 static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
     const size_t D = (size_t)s->dim, n = s->n;
     s->state_reals = n * (2 * D + D * D + (s->has_H ? D * D : 0) + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0) +
+                          (s->incompressible ? 1 : 0) +
                           (s->has_plastic ? tlsphi_plastic_reals(s->dim, s->thermal) : 0));
     s->now_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
     s->old_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
@@ -5319,6 +5784,7 @@ static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
             at += n;
         }
         if (s->has_plastic) u->plastic = at;
+        if (s->incompressible) u->q = at; /* without plasticity */
     }
 }
 static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
@@ -5354,6 +5820,18 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
         s->heat = TLSPHI_TAKE(arena, tlsph_real, D * n);
         s->h_J = TLSPHI_TAKE(arena, tlsph_real, n);
     }
+}
+static void tlsphi_layout_pressure(tlsph_solver *s, tlsphi_arena *arena) {
+    const size_t D = (size_t)s->dim, n = s->n;
+    tlsphi_pressure *const u = &s->pressure;
+    tlsph_real **const scalars[8] = {&u->b, &u->diagonal, &u->compact, &u->q, &u->r, &u->z, &u->p, &u->Sp};
+    if (!s->incompressible) return;
+    for (int i = 0; i < 8; i++) *scalars[i] = TLSPHI_TAKE(arena, tlsph_real, n);
+    u->A = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    u->a = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    u->slope = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    u->back = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    if (s->choice.iteration == TLSPH_DUAL_TIME) u->velocity = TLSPHI_TAKE(arena, tlsph_real, D * n);
 }
 static void tlsphi_layout_loads(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_plan *plan) {
     s->load = TLSPHI_TAKE(arena, tlsphi_load, s->loads);
@@ -5393,6 +5871,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->tau = TLSPHI_TAKE(arena, tlsph_real, n);
     tlsphi_layout_state(s, arena);
     tlsphi_layout_work(s, arena);
+    tlsphi_layout_pressure(s, arena);
     if (s->corrected) s->M = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
     s->fix = TLSPHI_TAKE(arena, tlsphi_fix, s->fixes);
     s->mirror = TLSPHI_TAKE(arena, tlsphi_mirror, s->mirrors ? s->mirrors + 1 : 0);
@@ -5619,9 +6098,10 @@ static uint64_t tlsphi_hash_reals(uint64_t h, const tlsph_real *x, size_t n) {
 }
 /* What a checkpoint must agree with: the layout of the state, the reference geometry and the materials. */
 static uint64_t tlsphi_fingerprint(const tlsph_solver *s) {
-    const unsigned char options[6] = {(unsigned char)s->dim,      (unsigned char)s->thermal,
+    const unsigned char options[7] = {(unsigned char)s->dim,      (unsigned char)s->thermal,
                                       (unsigned char)s->has_H,    (unsigned char)s->has_J,
-                                      (unsigned char)s->coupling, (unsigned char)s->material_count};
+                                      (unsigned char)s->coupling, (unsigned char)s->material_count,
+                                      (unsigned char)s->incompressible};
     uint64_t h = tlsphi_hash(0xcbf29ce484222325u, options, sizeof options);
     for (size_t i = 0; i < s->n; i++) {
         const size_t a = s->inner[i], D = (size_t)s->dim;
@@ -5645,6 +6125,12 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     double *g = TLSPHI_SCRATCH(plan, double, (size_t)plan->dim * plan->most);
     if (!list || !g) return tlsphi_no_memory(plan, 32.0 * (double)plan->most);
     for (size_t i = 0; i < s->material_count; i++) s->materials[i] = tlsphi_calibrate(plan->desc->materials + i);
+    for (size_t i = 0; s->incompressible && i < s->material_count; i++) {
+        const tlsph_material *m = plan->desc->materials + i;
+        s->materials[i].compressibility = 3 * (1 - 2 * m->poisson) / m->young;
+        s->materials[i].k = s->materials[i].kappa = 0;
+        s->materials[i].c_linear = tlsphi_sqrt(TLSPHI_R(4.0 / 3.0) * s->materials[i].mu / m->density);
+    }
     tlsphi_fill_blocks(s, plan);
     TLSPH_ASSERT(s->block[s->blocks - 1].end == s->n);
     tlsphi_fill_particles(s, plan);
@@ -5764,6 +6250,10 @@ TLSPHI_DEF tlsph_desc tlsph_desc_default(int dimension) {
     d.dissipation_heats = 1;
     d.projection = 1;
     d.cfl = TLSPHI_R(0.3);
+    d.incompressible.laplacian = TLSPHI_R(0.25);
+    d.incompressible.tolerance = sizeof(tlsph_real) == 8 ? TLSPHI_R(1e-6) : TLSPHI_R(1e-5);
+    d.incompressible.iteration_limit = 1000;
+    d.incompressible.pseudo_modulus = 50;
     return d;
 }
 TLSPHI_DEF tlsph_material tlsph_material_default(tlsph_material_kind kind) {

@@ -178,7 +178,7 @@ int main(int argc, char **argv) {
     int study = 0;
     const ex_option own[] = {
         { "n", EX_INT, &p.n, NULL, NULL, 2, 200, "spacings across the column's 1 m" },
-        { "nu", EX_REAL, &p.nu, NULL, NULL, -0.9, 0.499999, "Poisson's ratio" },
+        { "nu", EX_REAL, &p.nu, NULL, NULL, -0.9, 0.5, "Poisson's ratio; 0.5 itself needs --scheme incompressible" },
         { "omega", EX_REAL, &p.omega, "rad/s", NULL, -1e4, 1e4, "initial angular velocity of the top" },
         { "study", EX_FLAG, &study, NULL, NULL, 0, 0, "three resolutions n, n + 2, n + 4 side by side" } };
     twisting_column_default(&p);

@@ -26,6 +26,7 @@ void scene_options_default(scene_options *options) {
     options->integrator = (int)desc.integrator;
     options->sharp = desc.sharp_gradients;
     options->projection = desc.projection;
+    options->laplacian = (double)desc.incompressible.laplacian;
     options->frames = 20;
     options->output = "";
 }
@@ -68,6 +69,10 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = choice("integrator", &o->integrator, "rk2|ssprk3|rk3frozen|rk4frozen", "time integrator");
     table[i++] = whole("sharp", &o->sharp, 0, 1, "1: gradients of fourth-order dispersion (lattices only)");
     table[i++] = whole("projection", &o->projection, 0, 1, "1: conserve angular momentum exactly (000-79 to 82)");
+    table[i++] = choice("scheme", &o->scheme, "explicit|incompressible", "incompressible: nu up to 0.5, pressure solved for");
+    table[i++] = choice("pressure-iteration", &o->pressure_iteration, "cg|dual", "of the incompressible scheme");
+    table[i++] = real("laplacian", &o->laplacian, "", 0, 1, "alpha of the incompressible scheme (001-54)");
+    table[i++] = whole("laplacian-as-printed", &o->laplacian_as_printed, 0, 1, "1: jumps without reconstruction (001-58)");
     table[i++] = whole("threads", &o->threads, 0, 4096, "threads; 0: OpenMP's own choice");
     table[i++] = whole("frames", &o->frames, 0, 100000, "frames written as VTK files");
     table[i++] = output;
@@ -100,6 +105,14 @@ void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->integrator = (tlsph_integrator)options->integrator;
     desc->sharp_gradients = options->sharp;
     desc->projection = options->projection;
+    desc->scheme = (tlsph_scheme)options->scheme;
+    if (desc->scheme == TLSPH_INCOMPRESSIBLE) { /* the pressure takes the place of J */
+        if (desc->unknowns == TLSPH_PFJ) desc->unknowns = TLSPH_PF;
+        if (desc->unknowns == TLSPH_PFHJ) desc->unknowns = TLSPH_PFH;
+    }
+    desc->incompressible.iteration = (tlsph_pressure_iteration)options->pressure_iteration;
+    desc->incompressible.laplacian = (tlsph_real)options->laplacian;
+    desc->incompressible.laplacian_as_printed = options->laplacian_as_printed;
     desc->audit = options->audit;
     desc->threads = options->threads;
     desc->cfl = (tlsph_real)options->cfl;

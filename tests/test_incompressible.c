@@ -1,0 +1,158 @@
+/* The incompressible scheme's contract: refusals, limits on iterations, checkpoints, threads. */
+#include "support.h"
+
+static tlsph_material rubber(double poisson) {
+    tlsph_material m = tlsph_material_default(TLSPH_NEO_HOOKEAN);
+    m.young = R(1e6);
+    m.density = R(1000);
+    m.poisson = R(poisson);
+    return m;
+}
+
+/* A beam of 4 x 2 x 2 cells, clamped at X = 0, that swings; `change` may spoil the description. */
+static tlsph_result beam(void (*change)(tlsph_desc *desc, tlsph_material *material, tlsph_condition *conditions),
+                         tlsph_solver **solver, tlsph_error *error) {
+    const int cells[3] = { 4, 2, 2 };
+    tlsph_material material = rubber(0.5);
+    tlsph_condition conditions[2] = { tlsph_condition_default(TLSPH_CLAMPED), tlsph_condition_default(TLSPH_ACCELERATION) };
+    tlsph_desc desc = tlsph_desc_default(3);
+    uint32_t root[64];
+    own_cloud cloud;
+    tlsph_result result;
+    *solver = NULL;
+    if (!own_box(&cloud, 3, cells, 0.25, 0)) return TLSPH_ERROR_MEMORY;
+    desc.particles = cloud.particles;
+    desc.materials = &material;     desc.material_count = 1;
+    desc.conditions = conditions;   desc.condition_count = 2;
+    desc.scheme = TLSPH_INCOMPRESSIBLE;
+    desc.threads = 1;
+    conditions[0].particles = root;
+    conditions[0].count = tlsph_select_plane(&cloud.particles, 0, 0, R(1e-6), root, 64);
+    conditions[1].value[1] = R(-50);
+    if (change) change(&desc, &material, conditions);
+    result = tlsph_create(&desc, solver, error);
+    own_cloud_destroy(&cloud);
+    return result;
+}
+
+static void thermal(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) {
+    (void)c; d->thermal = TLSPH_ENERGY; m->specific_heat = 1;
+}
+static void evolves_J(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->unknowns = TLSPH_PFJ; }
+static void sharp(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->sharp_gradients = 1; }
+static void third_order(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->integrator = TLSPH_SSP_RK3; }
+static void gas(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)d; (void)c; m->kind = TLSPH_MIE_GRUNEISEN; }
+static void beyond(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)d; (void)c; m->poisson = R(0.51); }
+static void plain_half(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->scheme = TLSPH_EXPLICIT; }
+static void wall(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) {
+    (void)d; (void)m; c[1] = tlsph_condition_default(TLSPH_WALL); c[1].normal[0] = 1;
+}
+static void few_iterations(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) {
+    (void)m; (void)c; d->incompressible.iteration_limit = 1;
+}
+static void no_tolerance(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->incompressible.tolerance = 0; }
+
+TEST(refuses_what_it_cannot_do) {
+    static const struct {
+        void (*change)(tlsph_desc *, tlsph_material *, tlsph_condition *);
+        tlsph_result result;
+        const char *field;
+    } cases[] = { { thermal, TLSPH_ERROR_DESCRIPTION, "thermal" },      { evolves_J, TLSPH_ERROR_DESCRIPTION, "unknowns" },
+                  { sharp, TLSPH_ERROR_DESCRIPTION, "sharp_gradients" }, { third_order, TLSPH_ERROR_DESCRIPTION, "integrator" },
+                  { gas, TLSPH_ERROR_MATERIAL, "kind" },                 { beyond, TLSPH_ERROR_MATERIAL, "poisson" },
+                  { plain_half, TLSPH_ERROR_MATERIAL, "poisson" },       { wall, TLSPH_ERROR_CONDITION, "kind" },
+                  { no_tolerance, TLSPH_ERROR_DESCRIPTION, "incompressible.tolerance" } };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        tlsph_solver *solver;
+        tlsph_error error;
+        CHECK_RESULT(beam(cases[i].change, &solver, &error), cases[i].result);
+        CHECK(solver == NULL);
+        if (!CHECK(strcmp(error.field, cases[i].field) == 0)) REPORT("%s", error.message);
+    }
+}
+
+TEST(too_few_iterations_are_an_error_and_leave_the_last_good_state) {
+    tlsph_solver *solver;
+    REQUIRE_OK(beam(few_iterations, &solver, NULL));
+    CHECK_RESULT(tlsph_step(solver, R(1)), TLSPH_OK); /* a uniform fall needs no pressure */
+    const uint64_t before = state_hash(solver);
+    CHECK_RESULT(tlsph_step(solver, R(1)), TLSPH_ERROR_CONVERGENCE);
+    CHECK(state_hash(solver) == before);
+    CHECK_SAME(tlsph_step_count(solver), 1);
+    CHECK(tlsph_last_error(solver)->value > tlsph_last_error(solver)->limit);
+    CHECK(strstr(tlsph_last_error(solver)->message, "iteration_limit") != NULL);
+    tlsph_destroy(solver);
+}
+
+TEST(report_counts_and_the_explicit_scheme_has_none) {
+    moving_block block = moving_block_default();
+    tlsph_pressure_report report;
+    tlsph_solver *solver;
+    uint64_t sum = 0;
+    REQUIRE_OK(beam(NULL, &solver, NULL));
+    for (int i = 0; i < 5; i++) {
+        CHECK_RESULT(tlsph_step(solver, R(1)), TLSPH_OK);
+        CHECK_RESULT(tlsph_pressure_report_read(solver, &report), TLSPH_OK);
+        sum += (uint64_t)(report.iterations[0] + report.iterations[1]);
+        CHECK(report.residual[0] <= report.tolerance && report.residual[1] <= report.tolerance);
+    }
+    CHECK(sum > 0 && report.iterations_total == sum);
+    CHECK_BELOW(report.volume_error, 1e-3);
+    CHECK_RESULT(tlsph_pressure_report_read(solver, NULL), TLSPH_ERROR_ARGUMENT);
+    tlsph_destroy(solver);
+    REQUIRE_OK(moving_block_create(&block, &solver, NULL));
+    CHECK_RESULT(tlsph_pressure_report_read(solver, &report), TLSPH_ERROR_FIELD);
+    tlsph_destroy(solver);
+}
+
+TEST(checkpoint_continues_bitwise) {
+    tlsph_solver *whole, *resumed;
+    size_t size;
+    REQUIRE_OK(beam(NULL, &whole, NULL));
+    CHECK_RESULT(take_steps(whole, 4), TLSPH_OK);
+    unsigned char *saved = save_state(whole, &size);
+    REQUIRE(saved);
+    CHECK_RESULT(take_steps(whole, 6), TLSPH_OK);
+    REQUIRE_OK(beam(NULL, &resumed, NULL));
+    CHECK_RESULT(tlsph_restore(resumed, saved, size), TLSPH_OK);
+    CHECK_RESULT(take_steps(resumed, 6), TLSPH_OK);
+    CHECK(state_hash(whole) == state_hash(resumed));
+    free(saved);
+    tlsph_destroy(whole);
+    tlsph_destroy(resumed);
+}
+
+/* Blocks in any order, as threads would take them. */
+static void backwards(void *user, tlsph_task_fn task, void *arg, size_t count) {
+    (void)user;
+    while (count-- > 0) task(arg, count);
+}
+static void own_threads(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->run = backwards; }
+
+TEST(order_of_tasks_changes_no_bit) {
+    tlsph_solver *one, *two;
+    REQUIRE_OK(beam(NULL, &one, NULL));
+    REQUIRE_OK(beam(own_threads, &two, NULL));
+    CHECK_RESULT(take_steps(one, 5), TLSPH_OK);
+    CHECK_RESULT(take_steps(two, 5), TLSPH_OK);
+    CHECK(state_hash(one) == state_hash(two));
+    tlsph_destroy(one);
+    tlsph_destroy(two);
+}
+
+/* A linear material has H = I and J = 1 + tr eps: the beam under its own weight keeps its volume too. */
+static void linear(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)d; m->kind = TLSPH_LINEAR; c[1].value[1] = R(-1); }
+
+TEST(linear_material_keeps_its_volume) {
+    tlsph_solver *solver;
+    tlsph_pressure_report report;
+    REQUIRE_OK(beam(linear, &solver, NULL));
+    CHECK_RESULT(take_steps(solver, 20), TLSPH_OK);
+    CHECK_RESULT(tlsph_pressure_report_read(solver, &report), TLSPH_OK);
+    CHECK_BELOW(report.volume_error, 1e-4);
+    tlsph_destroy(solver);
+}
+
+SUITE(incompressible, ENTRY(refuses_what_it_cannot_do), ENTRY(too_few_iterations_are_an_error_and_leave_the_last_good_state),
+      ENTRY(report_counts_and_the_explicit_scheme_has_none), ENTRY(checkpoint_continues_bitwise),
+      ENTRY(order_of_tasks_changes_no_bit), ENTRY(linear_material_keeps_its_volume))
