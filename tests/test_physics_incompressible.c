@@ -47,7 +47,7 @@ static tlsph_material rubber(double poisson) {
 }
 
 /* Relative errors of velocity, F and pressure at the end; largest volume error on the way. */
-static void manufactured(int n, int operator_kind, double support, double errors[3], double *volume) {
+static void isochoric(int n, int operator_kind, double support, double errors[3], double *volume) {
     const tlsph_material material = rubber(0.5);
     tlsph_fill fill = tlsph_fill_default(2);
     scene_setup setup;
@@ -93,7 +93,7 @@ static void manufactured(int n, int operator_kind, double support, double errors
 
 static void check_orders(int operator_kind, double support, double least_order, double least_order_p) {
     double e[3][3], volume[3], list[3];
-    for (int i = 0; i < 3; i++) manufactured(6 << i, operator_kind, support, e[i], &volume[i]);
+    for (int i = 0; i < 3; i++) isochoric(6 << i, operator_kind, support, e[i], &volume[i]);
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++) list[i] = e[i][k];
         REPORT("%s %.1e %.1e %.1e order %.2f, ", k == 0 ? "v" : k == 1 ? "F" : "p", list[0], list[1], list[2],
