@@ -169,6 +169,7 @@ typedef enum tlsph_operator_kind {
     TLSPH_FIRST_KERNEL,     /* the same with the gradient of the first-order kernel (002-6 to 8, appendix A) */
     TLSPH_ZEROTH_BOND,      /* bond-based modified gradient F^c (002-37, 39) of the zeroth-order kernel, */
     TLSPH_BOND,             /* and of the first-order kernel. See [BONDS] for these four */
+    TLSPH_CELLS_4,          /* cells of equal size, fourth order inside and at mirrors, second at free faces: see "order 4" */
     TLSPH_GIVEN,            /* the host's own pair vectors, antisymmetric: C_ab = -C_ba */
     TLSPH_CLOSED            /* irregular clouds: antisymmetric, closed by `areas`, exact for linear fields; solved once at
                                creation. Best with TLSPH_WENDLAND_C2 and support 0.825 (17 neighbours in 3-D) */
@@ -1313,6 +1314,8 @@ typedef struct tlsphi_plan {
     size_t *cell_first;        /* TLSPH_CELLS: cells around each particle, */
     uint32_t *cell_of;
     double *volume;         /* and V_a made of them */
+    struct tlsphi_lines *lattice; /* TLSPH_CELLS_4 */
+    size_t damped_pairs, images;
     double *correction;     /* kernels: M_a, dim x dim each, host order */
     size_t *closed_first;   /* TLSPH_CLOSED: neighbour lists and C_ab, host order; NULL until they are solved */
     uint32_t *closed_list;
@@ -1471,10 +1474,233 @@ static size_t tlsphi_closed_neighbours(const tlsphi_plan *plan, size_t a, uint32
     return found;
 }
 
+/* -- builder: cells of order 4 --------------------------------------------------------------------------------------
+   Along a lattice line 1/V sum_b (f_b - f_a)/2 C_ab is a difference quotient sum_j Q_ij (f_j - f_i)/H_i with C = 2 Q times
+   the area across: Q = 2/3, -1/12 inside (fourth order). At a free end the first four rows are those of a summation-by-
+   parts operator (Strand 1994): there second order, everywhere antisymmetric, closed by the end's area, exact for linear
+   fields. At a roller or tangentially fixed face the line goes on as its mirror image, and the order stays.
+
+   Voxel bodies. Every plane at which the cross-section changes cuts the whole lattice; between cuts the body is a set of full
+   boxes. A box has the tensor product of its lines' operators (C along x: 2 Q_x H_y H_z areas), and V, C and B of boxes
+   that meet add up: faces that meet are whole and have equal weights H_y H_z, because both boxes share the intervals of
+   the other axes. So all properties carry over, re-entrant edges included; at a cut the order is that of a free end.
+   Intervals that are too short for this (less than 7 cells; with a mirror 4, between two 3) have H = 1/2, 1, 1, ... and
+   Q = 1/2, for all boxes in them: a body of short intervals, say a ball of voxels, gets TLSPH_CELLS.
+
+   The dissipation acts between first neighbours, with the area of the cross-section (a pair list of its own).
+
+   Mirrors. Beyond a plane through line point 0 the point -j carries the image of j. Pairs of the plane's own particles need
+   no images: what is odd across the plane has C_0j = C_0,-j together, half of it on this side, what is even cancels, and
+   the mirror rule of [EVALUATION] takes that away already. Only point 1 reaches over the plane to -1, its own image: a
+   difference of -2 times the odd part of v, so a term of particle 1 alone (tlsphi_image). */
+
+/* Cells [begin, end) of an axis with one operator. mirror: 0, or the condition's kind, at either end. */
+typedef struct tlsphi_interval {
+    uint32_t begin, end;
+    int mirror[2], fourth;
+} tlsphi_interval;
+typedef struct tlsphi_lines {
+    double size[3], low[3];
+    uint32_t layers[3];
+    tlsphi_interval *of_layer[3]; /* the interval of each layer of cells */
+    uint32_t *place, *step;       /* lattice place, 3 a particle; neighbours along -x, +x, -y, ... or TLSPHI_NONE */
+} tlsphi_lines;
+/* All about one particle. image: area of its own image beyond the mirrors -x, +x, -y, ... */
+typedef struct tlsphi_stencil {
+    size_t count;
+    uint32_t b[24];
+    double C[24][3], across[24][3], B[3], V, image[6];
+    int image_kind[6];
+} tlsphi_stencil;
+
+static double tlsphi_line_weight(const tlsphi_interval *line, uint32_t i) {
+    static const double H[4] = {17. / 48, 59. / 48, 43. / 48, 49. / 48};
+    const uint32_t n = line->end - line->begin, side = 2 * i > n, from_end = side ? n - i : i;
+    if (!line->fourth || line->mirror[side]) return from_end ? 1 : 0.5;
+    return from_end < 4 ? H[from_end] : 1;
+}
+/* 2 Q_ij for j = i + offset. */
+static double tlsphi_line_pair(const tlsphi_interval *line, uint32_t i, int offset) {
+    static const double Q[4][4] = {{0, 59. / 48, -1. / 6, -1. / 16}, {0, 59. / 48, 0, 0}, {0, 59. / 48, -1. / 6, 0},
+                                   {0, 4. / 3, -1. / 6, 0}};
+    static const double inner[4] = {0, 4. / 3, -1. / 6, 0};
+    const int n = (int)(line->end - line->begin), j = (int)i + offset, reach = offset < 0 ? -offset : offset;
+    const int sign = offset < 0 ? -1 : 1, left = offset < 0 ? j : (int)i, right = n - left - reach;
+    if (left < 0 || right < 0) return 0;
+    if (!line->fourth) return reach == 1 ? sign : 0;
+    if (left < 4 && !line->mirror[0]) return sign * Q[left][reach];
+    if (right < 4 && !line->mirror[1]) return sign * Q[right][reach];
+    return sign * inner[reach];
+}
+
+/* Adds a particle's share in one box; line: the box's intervals, i: the place in them. */
+static void tlsphi_box_stencil(const tlsphi_plan *plan, size_t a, tlsphi_interval *const line[3], const uint32_t i[3],
+                               tlsphi_stencil *out) {
+    const tlsphi_lines *lattice = plan->lattice;
+    double length[3] = {1, 1, 1};
+    for (int x = 0; x < plan->dim; x++) length[x] = tlsphi_line_weight(line[x], i[x]) * lattice->size[x];
+    out->V += length[0] * length[1] * length[2];
+    for (int x = 0; x < plan->dim; x++) {
+        const double area = length[0] * length[1] * length[2] / length[x];
+        const uint32_t n = line[x]->end - line[x]->begin;
+        for (int side = 0; side < 2; side++) {
+            const uint32_t from_end = side ? n - i[x] : i[x];
+            uint32_t b = (uint32_t)a;
+            if (from_end == 0) out->B[x] += side ? area : -area;
+            if (from_end == 1 && line[x]->fourth && line[x]->mirror[side]) {
+                out->image[2 * x + side] += area / 6;
+                out->image_kind[2 * x + side] = line[x]->mirror[side];
+            }
+            for (int reach = 1; reach <= (line[x]->fourth ? 3 : 1); reach++) {
+                const double C = area * tlsphi_line_pair(line[x], i[x], side ? reach : -reach);
+                if (b != TLSPHI_NONE) b = lattice->step[6 * (size_t)b + (size_t)(2 * x + side)];
+                if (!(C < 0) && !(C > 0)) continue;
+                size_t at = 0;
+                while (at < out->count && out->b[at] != b) at++;
+                if (at == out->count) out->b[out->count++] = b;
+                out->C[at][x] += C;
+                if (reach == 1) out->across[at][x] += side ? area : -area;
+            }
+        }
+    }
+}
+/* A particle's boxes are those of the cells around it; a box counts once, by its cell on the upper sides. */
+static void tlsphi_stencil_of(const tlsphi_plan *plan, size_t a, tlsphi_stencil *out) {
+    const tlsphi_lines *lattice = plan->lattice;
+    memset(out, 0, sizeof *out);
+    for (size_t k = plan->cell_first[a]; k < plan->cell_first[a + 1]; k++) {
+        const uint32_t *corner = plan->desc->particles.cells + ((size_t)plan->cell_of[k] << plan->dim);
+        tlsphi_interval *line[3] = {NULL, NULL, NULL};
+        uint32_t i[3] = {0, 0, 0};
+        int me = 0, counts = 1;
+        while (corner[me] != a) me++;
+        for (int x = 0; x < plan->dim; x++) {
+            const uint32_t place = lattice->place[3 * a + (size_t)x], below = (uint32_t)(me >> x & 1);
+            line[x] = lattice->of_layer[x] + (place - below);
+            i[x] = place - line[x]->begin;
+            if (below && place < line[x]->end) counts = 0;
+        }
+        if (counts) tlsphi_box_stencil(plan, a, line, i, out);
+    }
+}
+static size_t tlsphi_fourth_neighbours(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
+    tlsphi_stencil stencil;
+    tlsphi_stencil_of(plan, a, &stencil);
+    for (size_t i = 0; list && i < stencil.count; i++) {
+        list[i] = stencil.b[i];
+        for (int k = 0; k < plan->dim; k++) g[(size_t)plan->dim * i + (size_t)k] = stencil.C[i][k];
+    }
+    return stencil.count;
+}
+/* What the images add to sum C (x) d / 2. */
+static void tlsphi_image_moment(const tlsphi_plan *plan, size_t a, double A[9]) {
+    tlsphi_stencil stencil;
+    tlsphi_stencil_of(plan, a, &stencil);
+    for (int x = 0; x < plan->dim; x++)
+        A[4 * x] -= (stencil.image[2 * x] + stencil.image[2 * x + 1]) * plan->lattice->size[x];
+}
+
+/* Places on the lattice, which all particles must meet, and steps to the lattice neighbours. */
+static tlsph_result tlsphi_lattice_places(tlsphi_plan *plan, tlsphi_lines *l) {
+    const uint32_t *cells = plan->desc->particles.cells;
+    for (int x = 0; x < plan->dim; x++) {
+        l->low[x] = HUGE_VAL;
+        for (size_t a = 0; a < plan->n; a++) l->low[x] = tlsphi_dmin(l->low[x], (double)tlsphi_position(plan, a)[x]);
+    }
+    tlsphi_cell_size(plan, 0, l->size);
+    for (size_t a = 0; a < plan->n; a++)
+        for (int x = 0; x < plan->dim; x++) {
+            const double place = ((double)tlsphi_position(plan, a)[x] - l->low[x]) / l->size[x];
+            if (!(fabs(place - floor(place + 0.5)) < (TLSPHI_EPSILON > 1e-10 ? 1e-2 : 1e-6)) || place > 1e6)
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "place on the lattice", a, place, 0,
+                                        "whole numbers up to 1e6: order 4 needs cells of one size");
+            l->place[3 * a + (size_t)x] = (uint32_t)(place + 0.5);
+            if (l->place[3 * a + (size_t)x] > l->layers[x]) l->layers[x] = l->place[3 * a + (size_t)x];
+        }
+    for (size_t i = 0; i < 6 * plan->n; i++) l->step[i] = TLSPHI_NONE;
+    for (size_t c = 0; c < plan->desc->particles.cell_count; c++)
+        for (int k = 0; k < 1 << plan->dim; k++)
+            for (int x = 0; x < plan->dim; x++) {
+                const uint32_t *corner = cells + (c << plan->dim);
+                l->step[6 * (size_t)corner[k] + (size_t)(2 * x + !(k >> x & 1))] = corner[k ^ (1 << x)];
+            }
+    return TLSPH_OK;
+}
+/* The mirror through all particles of the plane at `place`: kind of the condition, or 0. */
+static int tlsphi_plane_mirror(const tlsphi_plan *plan, const uint8_t *mirrors, int x, uint32_t place) {
+    int common = 3; /* bits: roller, tangent */
+    for (size_t a = 0; a < plan->n; a++)
+        if (plan->lattice->place[3 * a + (size_t)x] == place) common &= mirrors[a] >> (2 * x);
+    return common & 1 ? TLSPH_ROLLER : common & 2 ? TLSPH_TANGENT : 0;
+}
+/* Which particles lie in mirrors across the axes. Scalars are even at rollers (not at those that conduct heat), but neither
+   even nor odd at tangentially fixed faces: these are mirrors only where no scalar needs a gradient. */
+static void tlsphi_mark_mirrors(const tlsphi_plan *plan, uint8_t *mirrors) {
+    const tlsph_desc *d = plan->desc;
+    const int scalars = d->thermal || d->unknowns == TLSPH_PFJ || d->unknowns == TLSPH_PFHJ;
+    for (size_t k = 0; d->mirror_gradients && k < d->condition_count; k++) {
+        const tlsph_condition *c = d->conditions + k;
+        const int roller = c->kind == TLSPH_ROLLER && !(d->thermal && c->conducts);
+        double N2 = 0;
+        for (int x = 0; x < plan->dim; x++) N2 += (double)c->normal[x] * (double)c->normal[x];
+        if (!roller && (c->kind != TLSPH_TANGENT || scalars)) continue;
+        for (int x = 0; x < plan->dim; x++)
+            for (size_t i = 0; pow((double)c->normal[x], 2) > (1 - 1e-9) * N2 && i < (c->particles ? c->count : plan->n); i++)
+                mirrors[c->particles ? c->particles[i] : i] |= (uint8_t)((roller ? 1 : 2) << (2 * x));
+    }
+}
+/* Cuts an axis where the pattern of cells changes, and chooses the order of each interval. */
+static tlsph_result tlsphi_cut_axis(tlsphi_plan *plan, int x, const uint8_t *mirrors) {
+    tlsphi_lines *l = plan->lattice;
+    const uint32_t layers = l->layers[x];
+    uint64_t *pattern = TLSPHI_SCRATCH(plan, uint64_t, layers);
+    l->of_layer[x] = TLSPHI_SCRATCH(plan, tlsphi_interval, layers);
+    if (!pattern || !l->of_layer[x]) return tlsphi_no_memory(plan, 40.0 * layers);
+    for (size_t c = 0; c < plan->desc->particles.cell_count; c++) { /* a sum of scrambled places: order does not matter */
+        const uint32_t *at = l->place + 3 * (size_t)plan->desc->particles.cells[c << plan->dim];
+        uint64_t h = at[(x + 1) % 3] * (uint64_t)0x9e3779b97f4a7c15u + at[(x + 2) % 3] + 1;
+        h = (h ^ h >> 29) * 0xbf58476d1ce4e5b9u;
+        pattern[at[x]] += (h ^ h >> 32) | 1;
+    }
+    for (uint32_t begin = 0, end; begin < layers; begin = end) {
+        tlsphi_interval line = {begin, 0, {0, 0}, 0};
+        for (end = begin + 1; end < layers && pattern[end] == pattern[begin];) end++;
+        line.end = end;
+        if (begin == 0 || pattern[begin - 1] == 0) line.mirror[0] = tlsphi_plane_mirror(plan, mirrors, x, begin);
+        if (end == layers || pattern[end] == 0) line.mirror[1] = tlsphi_plane_mirror(plan, mirrors, x, end);
+        const int images = (line.mirror[0] != 0) + (line.mirror[1] != 0);
+        line.fourth = end - begin >= (images == 2 ? 3u : images == 1 ? 4u : 7u);
+        for (uint32_t i = begin; i < end; i++) l->of_layer[x][i] = line;
+    }
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_fourth_build(tlsphi_plan *plan) {
+    tlsphi_lines *l = plan->lattice = TLSPHI_SCRATCH(plan, tlsphi_lines, 1);
+    uint8_t *mirrors = TLSPHI_SCRATCH(plan, uint8_t, plan->n);
+    tlsph_result r;
+    if (l) l->place = TLSPHI_SCRATCH(plan, uint32_t, 3 * plan->n);
+    if (l) l->step = TLSPHI_SCRATCH(plan, uint32_t, 6 * plan->n);
+    if (!l || !mirrors || !l->place || !l->step) return tlsphi_no_memory(plan, 37.0 * (double)plan->n);
+    if ((r = tlsphi_lattice_places(plan, l))) return r;
+    tlsphi_mark_mirrors(plan, mirrors);
+    for (int x = 0; x < plan->dim; x++)
+        if ((r = tlsphi_cut_axis(plan, x, mirrors))) return r;
+    for (size_t a = 0; a < plan->n; a++) {
+        tlsphi_stencil stencil;
+        tlsphi_stencil_of(plan, a, &stencil);
+        plan->volume[a] = stencil.V;
+        for (size_t i = 0; i < stencil.count; i++)
+            plan->damped_pairs += fabs(stencil.across[i][0]) + fabs(stencil.across[i][1]) + fabs(stencil.across[i][2]) > 0;
+        for (int i = 0; i < 6; i++) plan->images += stencil.image[i] > 0;
+    }
+    return TLSPH_OK;
+}
+
 static size_t tlsphi_neighbours_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
     switch (plan->desc->operator_kind) {
     case TLSPH_CLOSED: return tlsphi_closed_neighbours(plan, a, list, g);
     case TLSPH_CELLS: return tlsphi_cell_neighbours(plan, a, list, g);
+    case TLSPH_CELLS_4: return tlsphi_fourth_neighbours(plan, a, list, g);
     case TLSPH_GIVEN: return tlsphi_given_neighbours(plan, a, list, g);
     default: return tlsphi_kernel_neighbours(plan, a, list, g);
     }
@@ -1842,6 +2068,7 @@ static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t 
         double A[9];
         const size_t count = tlsphi_neighbours_of(plan, a, list, g);
         tlsph_result r = tlsphi_moment(plan, a, list, g, count, A);
+        if (plan->lattice) tlsphi_image_moment(plan, a, A);
         if (!r && plan->bond) r = tlsphi_bond_correct(plan, a, list, count);
         if (r) return r;
         const double V = tlsphi_plan_volume(plan, a);
@@ -2826,11 +3053,19 @@ typedef struct tlsphi_pressure {
     tlsph_real *A, *a, *slope, *back, *velocity;                 /* DD, D, D, D, D */
     tlsph_real *b, *diagonal, *compact, *q, *r, *z, *p, *Sp;     /* 1 each */
 } tlsphi_pressure;
+/* The image of a particle beyond a mirror plane of normal N next to it, seen with C = c N: its v differs by -2 times the odd
+   part, along N at rollers, across it at tangentially fixed faces. */
+typedef struct tlsphi_image {
+    uint32_t particle;
+    int tangent, axis;
+    tlsph_real c;
+} tlsphi_image;
 
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user, has_plastic;
     int audit, projection, dissipation_heats, retries, threads, bonds;
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
+    int parted;        /* stresses and dissipation are gathered apart: frozen, or over different pairs */
     tlsph_integrator integrator;
     tlsph_dissipation dissipation;
     tlsph_force_form force_form;
@@ -2847,6 +3082,11 @@ struct tlsph_solver {
     size_t *first;
     uint32_t *neighbour;
     tlsph_real *g, *M, *rest; /* rest: r_ab, see [BONDS] */
+    size_t *damped_first; /* the pairs of the dissipation: the same arrays, but for TLSPH_CELLS_4 */
+    uint32_t *damped_neighbour;
+    tlsph_real *damped_g;
+    size_t images;
+    struct tlsphi_image *image; /* TLSPH_CELLS_4: sorted by particle */
     tlsph_real *X, *V, *B, *tau;
     uint32_t *host, *inner;
     /* state, and the state at the beginning of the step */
@@ -3441,13 +3681,55 @@ TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, con
     default: tlsphi_gradient_particle(s, a, dim, 1, 1, 1); break;
     }
 }
+/* The odd part of a vector across an image's mirror; the image's share in grad v (for w it is the same, because the rigid
+   motion respects the mirrors) and, adjoint, in the force: (P_a + P_image) C/2 is the odd part of P C. The force comes
+   after the projection: it is no internal one, the other half of the body exerts it. */
+static void tlsphi_odd_part(const tlsphi_image *image, int dim, tlsph_real *v) {
+    for (int i = 0; i < dim; i++)
+        if ((i == image->axis) == (image->tangent != 0)) v[i] = 0;
+}
+static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *image, int with_w) {
+    const size_t D = (size_t)s->dim, a = image->particle, axis = (size_t)image->axis;
+    const tlsph_real factor = -image->c / s->V[a];
+    tlsph_real odd[3] = {0, 0, 0};
+    memcpy(odd, s->v + D * a, D * sizeof *odd);
+    tlsphi_odd_part(image, s->dim, odd);
+    for (size_t i = 0; i < D; i++) {
+        const size_t at = D * D * a + D * i + axis;
+        s->grad_v[at] += factor * odd[i];
+        if (with_w) s->grad_w[at] += factor * odd[i];
+        if (s->rate_E) s->rate_E[a] += s->PM[at] * factor * odd[i];
+    }
+}
+static void tlsphi_image_forces(tlsph_solver *s) {
+    const size_t D = (size_t)s->dim;
+    for (const tlsphi_image *image = s->image, *end = image + s->images; image != end; image++) {
+        const size_t a = image->particle;
+        tlsph_real force[3] = {0, 0, 0};
+        for (size_t i = 0; i < D; i++) force[i] = s->PM[D * D * a + D * i + (size_t)image->axis] * image->c / s->V[a];
+        tlsphi_odd_part(image, s->dim, force);
+        for (size_t i = 0; i < D; i++) s->rate_p[D * a + i] += force[i];
+    }
+}
+/* First image of a particle >= a. */
+static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
+    size_t low = 0, high = s->images;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (s->image[middle].particle < a) low = middle + 1;
+        else high = middle;
+    }
+    return s->image + low;
+}
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     const int with_S = s->grad_S && s->damps, with_theta = s->grad_theta != NULL;
     const int with_w = s->projection && (s->damps || s->rate_E); /* w and Sigma_J are there for the dissipation and E */
+    const tlsphi_image *image = tlsphi_find_image(s, block->begin), *last = s->image + s->images;
     for (size_t a = block->begin; a < block->end; a++) {
         if (s->dim == 3) tlsphi_gradient_dispatch(s, a, 3, with_w, with_S, with_theta);
         else tlsphi_gradient_dispatch(s, a, 2, with_w, with_S, with_theta);
         if (s->rest) tlsphi_gradient_rest(s, a);
+        for (; image != last && image->particle == a; image++) tlsphi_image_gradient(s, image, with_w);
         if (s->mirrors) tlsphi_mirror_gradients(s, a);
         if (s->rate_J && !s->sharp) tlsphi_jacobian_rate(s, a);
         if (with_theta) tlsphi_heat_flux(s, a);
@@ -3707,14 +3989,17 @@ static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsp
     return size > 0 ? (double)production / size : 0;
 }
 
-/* parts: a constant, TLSPHI_STRESSES (and heat) or TLSPHI_DAMPING or both; parted only where the dissipation is frozen. */
+/* parts: a constant, TLSPHI_STRESSES (and heat) or TLSPHI_DAMPING or both; apart only where the dissipation is frozen or
+   has pairs of its own. */
 enum { TLSPHI_STRESSES = 1, TLSPHI_DAMPING = 2, TLSPHI_BOTH = 3 };
 TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int dim, const int with_J,
                                      const int thermal, const int plain, const int parts, tlsphi_gathered *sum) {
-    const size_t D = (size_t)dim, dd = D * D;
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const size_t b = s->neighbour[k];
-        const tlsph_real *g = s->g + D * k, *C = g;
+    const size_t D = (size_t)dim, dd = D * D, *first = parts == TLSPHI_DAMPING ? s->damped_first : s->first;
+    const uint32_t *neighbour = parts == TLSPHI_DAMPING ? s->damped_neighbour : s->neighbour;
+    const tlsph_real *vectors = parts == TLSPHI_DAMPING ? s->damped_g : s->g;
+    for (size_t k = first[a]; k < first[a + 1]; k++) {
+        const size_t b = neighbour[k];
+        const tlsph_real *g = vectors + D * k, *C = g;
         tlsph_real t[3], c[3], skew[3], production = 0;
         if (!plain && s->M) {
             tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
@@ -3750,6 +4035,12 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
     }
 }
 
+TLSPHI_INLINE void tlsphi_add_gathered(tlsphi_gathered *sum, const tlsphi_gathered *more) {
+    for (int i = 0; i < 3; i++) sum->T[i] += more->T[i];
+    sum->J += more->J;
+    sum->heat += more->heat;
+    sum->production += more->production;
+}
 /* Frozen dissipation (see [STEP]): evaluates and keeps it in the first stage, adds it in all. */
 TLSPHI_INLINE void tlsphi_keep_damping(const tlsph_solver *s, size_t a, const int dim, const tlsphi_gathered *damping) {
     tlsph_real *held = s->held + (size_t)(dim + 2) * a;
@@ -3810,19 +4101,20 @@ TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const
         tlsphi_gathered sum;
         memset(&sum, 0, sizeof sum);
         sum.least = TLSPHI_LARGEST;
-        if (!s->frozen) {
+        if (!s->parted) {
             tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_BOTH, &sum);
         } else {
             tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_STRESSES, &sum);
-            if (s->damps) {
+            if (!s->frozen || s->damps) {
                 tlsphi_gathered damping;
                 memset(&damping, 0, sizeof damping);
                 damping.least = TLSPHI_LARGEST;
                 tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_DAMPING, &damping);
+                if (s->frozen) tlsphi_keep_damping(s, a, dim, &damping);
+                else tlsphi_add_gathered(&sum, &damping);
                 sum.least = damping.least;
-                tlsphi_keep_damping(s, a, dim, &damping);
             }
-            tlsphi_add_damping(s, a, dim, &sum);
+            if (s->frozen) tlsphi_add_damping(s, a, dim, &sum);
         }
         tlsphi_flux_store(s, a, &sum, block->sums);
     }
@@ -4387,6 +4679,7 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
     tlsphi_run(s, tlsphi_flux_block);
     tlsphi_collect_sums(s, stage->rate_weight * dt);
     if (s->projection) tlsphi_project(&projection);
+    tlsphi_image_forces(s);
     tlsphi_apply_loads(s, stage, dt);
 }
 
@@ -5418,6 +5711,9 @@ static tlsph_result tlsphi_check_range(tlsphi_plan *plan, const char *field, dou
                ? TLSPH_OK
                : tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, field, TLSPH_NO_PARTICLE, value, low, allowed);
 }
+static int tlsphi_is_cells(const tlsph_desc *d) {
+    return d->operator_kind == TLSPH_CELLS || d->operator_kind == TLSPH_CELLS_4;
+}
 static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
     const tlsph_desc *d = plan->desc;
     const struct {
@@ -5477,9 +5773,9 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "operator", TLSPH_NO_PARTICLE, (double)d->operator_kind, 0,
                                 "plain corrected kernels, cells or given pairs with TLSPH_INCOMPRESSIBLE");
     const int pointers = d->materials && d->particles.positions &&
-                         (d->particles.volumes || d->operator_kind == TLSPH_CELLS) &&
+                         (d->particles.volumes || tlsphi_is_cells(d)) &&
                          (!d->condition_count || d->conditions) &&
-                         (d->operator_kind != TLSPH_CELLS || (d->particles.cells && d->particles.cell_count)) &&
+                         (!tlsphi_is_cells(d) || (d->particles.cells && d->particles.cell_count)) &&
                          (d->operator_kind != TLSPH_GIVEN ||
                           (d->particles.first && d->particles.neighbours && d->particles.pair_vectors));
     if (d->operator_kind == TLSPH_CLOSED && !d->particles.areas)
@@ -5674,7 +5970,11 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     plan->weights = desc->particles.weights ? desc->particles.weights : desc->particles.volumes;
     if ((r = tlsphi_check_particles(plan)) || (r = tlsphi_check_materials(plan)) || (r = tlsphi_plan_conditions(plan)))
         return r;
-    if (desc->operator_kind == TLSPH_CELLS && (r = tlsphi_cells_build(plan))) return r;
+    if (tlsphi_is_cells(desc) && (r = tlsphi_cells_build(plan))) return r;
+    if (desc->operator_kind == TLSPH_CELLS_4 && (desc->sharp_gradients || desc->dissipation == TLSPH_JST || desc->scheme == TLSPH_INCOMPRESSIBLE))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "operator_kind", TLSPH_NO_PARTICLE, TLSPH_CELLS_4, 0,
+                                "TLSPH_CELLS_4 without sharp gradients (it has their order), TLSPH_JST, TLSPH_INCOMPRESSIBLE");
+    if (desc->operator_kind == TLSPH_CELLS_4 && (r = tlsphi_fourth_build(plan))) return r;
     if (desc->operator_kind == TLSPH_GIVEN && (r = tlsphi_given_check(plan))) return r;
     tlsphi_smoothing_length(plan);
     if ((r = tlsphi_grid_build(plan))) return r;
@@ -5727,6 +6027,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->laplacian_share = d->incompressible.laplacian;
     s->frozen = d->integrator >= TLSPH_RK3_FROZEN && d->dissipation != TLSPH_NO_DISSIPATION;
     s->damps = 1;
+    s->parted = s->frozen || plan->lattice != NULL;
+    s->images = plan->images;
     s->bonds = plan->bond != NULL;
     s->force_form = d->force_form;
     s->step_rule = d->step_rule;
@@ -5884,6 +6186,10 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
                                                     sizeof(tlsph_real);
     s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
     s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
+    s->damped_first = plan->lattice ? TLSPHI_TAKE(arena, size_t, n + 1) : s->first;
+    s->damped_neighbour = plan->lattice ? TLSPHI_TAKE(arena, uint32_t, plan->damped_pairs) : s->neighbour;
+    s->damped_g = plan->lattice ? TLSPHI_TAKE(arena, tlsph_real, D * plan->damped_pairs) : s->g;
+    s->image = TLSPHI_TAKE(arena, tlsphi_image, s->images);
     if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
     s->size.bytes = arena->used + 63;
@@ -5973,6 +6279,39 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
         s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum /
                                  (s->sharp ? TLSPHI_SHARP_STEP : 1));
+    }
+}
+/* TLSPH_CELLS_4: pairs of the dissipation, areas of the faces, images; the step's length by the cross-sections. */
+static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
+    const size_t D = (size_t)s->dim;
+    size_t at = 0, image = 0;
+    for (size_t a = 0; plan->lattice && a < s->n; a++) {
+        tlsphi_stencil stencil;
+        size_t count = 0;
+        double sum = 0;
+        tlsphi_stencil_of(plan, plan->host[a], &stencil);
+        for (size_t i = 0; i < stencil.count; i++) {
+            const double *across = stencil.across[i], size = fabs(across[0]) + fabs(across[1]) + fabs(across[2]);
+            if (!(size > 0)) continue;
+            for (size_t k = 0; k < D; k++) g[D * count + k] = across[k];
+            list[count++] = plan->inner[stencil.b[i]];
+            sum += size;
+        }
+        tlsphi_sort_pairs(s->dim, list, g, count);
+        for (size_t i = 0; i < count; i++, at++) {
+            s->damped_neighbour[at] = list[i];
+            for (size_t k = 0; k < D; k++) s->damped_g[D * at + k] = (tlsph_real)g[D * i + k];
+        }
+        s->damped_first[a + 1] = at;
+        s->tau[a] = (tlsph_real)(2 * (double)s->dim * stencil.V / sum);
+        for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)stencil.B[k];
+        for (int i = 0; i < 6; i++) {
+            if (!(stencil.image[i] > 0)) continue;
+            s->image[image].particle = (uint32_t)a;
+            s->image[image].tangent = stencil.image_kind[i] == TLSPH_TANGENT;
+            s->image[image].axis = i / 2;
+            s->image[image++].c = (tlsph_real)(i % 2 ? -stencil.image[i] : stencil.image[i]);
+        }
     }
 }
 /* l_ab, what corrects it, and the step that the dissipation allows by Gershgorin's bound 2 sum_b l_ab / V_a. */
@@ -6135,6 +6474,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     TLSPH_ASSERT(s->block[s->blocks - 1].end == s->n);
     tlsphi_fill_particles(s, plan);
     tlsphi_fill_pairs(s, plan, list, g);
+    tlsphi_fill_fourth(s, plan, list, g);
     tlsphi_fill_laplacian(s);
     tlsphi_fill_fixes(s, plan);
     tlsphi_fill_mirrors(s, plan);
@@ -7260,7 +7600,7 @@ TLSPHI_DEF void tlsph_preflight(const tlsph_solver *s, tlsph_real end_time, tlsp
     tlsphi_hint(r, TLSPH_HINT_WEAK_SUPPORT, r->support < 0.1);
     tlsphi_hint(r, TLSPH_HINT_IRREGULAR, tlsphi_is_irregular(s));
     for (size_t i = 0; i < s->material_count && !s->has_J; i++) /* kappa/mu at nu = 0.49 */
-        tlsphi_hint(r, TLSPH_HINT_INCOMPRESSIBLE, s->materials[i].kappa > 49.7 * s->materials[i].mu);
+        tlsphi_hint(r, TLSPH_HINT_INCOMPRESSIBLE, s->materials[i].kappa > TLSPHI_R(49.7) * s->materials[i].mu);
     tlsphi_hint(r, TLSPH_HINT_CFL, s->cfl > tlsph_cfl_limit(s->integrator));
     tlsphi_hint(r, TLSPH_HINT_SMALL_PARTICLES, r->spacing_least < 0.1 * r->spacing_most);
     tlsphi_hint(r, TLSPH_HINT_DIFFUSION, r->time_step < 0.5 * sound_step && s->conducts);

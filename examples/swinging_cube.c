@@ -51,10 +51,14 @@ static void draw(run *r) {
     driver_snapshot_free(&shot);
 }
 
-/* Best columns of 001 table 1 at h = 1/4, 1/8, 1/16, 1/24; between them the error falls with h^2. Without sharp gradients
-   the scheme is the papers' own stencil, whose errors are larger (METHOD section 6, base row, with 10 %). */
+/* Best columns of 001 table 1 at h = 1/4, 1/8, 1/16, 1/24; between them the error falls with h^2. */
+static const double cells[4] = { 4, 8, 16, 24 };
+static const double p_best[4] = { 2.490e-3, 8.123e-4, 2.198e-4, 9.342e-5 };
+static const double P_best[4] = { 3.964e-3, 2.051e-3, 5.554e-4, 2.456e-4 };
+
+/* The table's error; a fifth of it from h = 1/16 for operators of order 4. With neither these nor sharp gradients the
+   scheme is the papers' own stencil, whose errors are larger (METHOD section 6, base row, with 10 %). */
 static double expected(double n, const double table[4]) {
-    static const double cells[4] = { 4, 8, 16, 24 };
     int i = 0;
     while (i < 3 && n >= cells[i + 1]) i++;
     return table[i] * pow(cells[i] / n, 2);
@@ -62,17 +66,87 @@ static double expected(double n, const double table[4]) {
 
 static void report(const run *r) {
     static const double p_plain[4] = { 2.0e-2, 4.5e-3, 1.07e-3, 4.6e-4 }, P_plain[4] = { 1.9e-2, 4.4e-3, 1.06e-3, 4.6e-4 };
-    static const double p_best[4] = { 2.490e-3, 8.123e-4, 2.198e-4, 9.342e-5 };
-    static const double P_best[4] = { 3.964e-3, 2.051e-3, 5.554e-4, 2.456e-4 };
     const swinging_cube_parameters *p = &r->cube.parameters;
+    const int fourth = p->options.operator_kind == TLSPH_CELLS_4 && !p->options.sharp, plain = !fourth && !p->options.sharp;
+    const double share = fourth && p->n >= 16 ? 0.2 : 1;
     double error_p, error_P;
     swinging_cube_errors(&r->cube, &error_p, &error_P);
     ex_result("time", r->base.now.time, "s");
     ex_result("error_p_x", error_p, "1");
     ex_result("error_P_xX", error_P, "1");
     if (p->jitter > 0 || fabs(r->base.now.time - 0.002) > 1e-9) return; /* the table is for a lattice at 0.002 s */
-    ex_check_below("error_p_x", error_p, expected(p->n, p->options.sharp ? p_best : p_plain));
-    ex_check_below("error_P_xX", error_P, expected(p->n, p->options.sharp ? P_best : P_plain));
+    ex_check_below("error_p_x", error_p, share * expected(p->n, plain ? p_plain : p_best));
+    ex_check_below("error_P_xX", error_P, share * expected(p->n, plain ? P_plain : P_best));
+}
+
+/* ---- study: table 1 and errors against the CFL number ------------------------------------------------------------- */
+
+#define COURANTS 4
+static const double courants[COURANTS] = { 0.2, 0.3, 0.4, 0.5 };
+
+/* Errors of p_x and P_xX and the time of computing, s. */
+static int study_run(const swinging_cube_parameters *base, int n, double cfl, int old, double out[3], tlsph_error *error) {
+    swinging_cube_parameters p = *base;
+    swinging_cube cube;
+    double began;
+    p.n = n;
+    p.options.cfl = cfl;
+    if (old) { p.options.operator_kind = TLSPH_CORRECTED_KERNEL; p.options.integrator = TLSPH_RK2; p.options.sharp = 0; }
+    if (swinging_cube_create(&p, &cube, error) != TLSPH_OK) return 1;
+    began = ex_cpu_seconds();
+    if (tlsph_advance(cube.body.solver, (tlsph_real)p.options.end_time)) *error = *tlsph_last_error(cube.body.solver);
+    out[2] = ex_cpu_seconds() - began;
+    swinging_cube_errors(&cube, &out[0], &out[1]);
+    scene_destroy(&cube.body);
+    return error->result != TLSPH_OK;
+}
+
+static int run_study(const swinging_cube_parameters *p) {
+    static const char *const names[6] = { "p_x, CFL 0.5", "P_xX, CFL 0.5", "p_x, table 1", "P_xX, table 1", "p_x, 6 neighbours, RK2",
+                                          "P_xX, 6 neighbours, RK2" };
+    const char *folder = p->options.output[0] ? p->options.output : "out/swinging_cube";
+    double error[4][COURANTS + 1][3], h[4], y[6][4], order[2];
+    ex_curve curves[6];
+    ex_axes axes;
+    tlsph_error record;
+    char path[512];
+    memset(&record, 0, sizeof record);
+    memset(curves, 0, sizeof curves);
+    memset(&axes, 0, sizeof axes);
+    printf("%6s %10s %10s %22s", "h", "p table 1", "P table 1", "6 neighbours, CFL 0.3");
+    for (int j = 0; j < COURANTS; j++) printf("                CFL %.1f", courants[j]);
+    printf("  (p_x, P_xX, seconds)\n");
+    for (int i = 0; i < 4; i++) {
+        h[i] = 1 / cells[i];
+        printf("  1/%-2.0f %10.2e %10.2e", cells[i], p_best[i], P_best[i]);
+        for (int j = -1; j < COURANTS; j++) {
+            double *e = error[i][j < 0 ? COURANTS : j];
+            if (study_run(p, (int)cells[i], j < 0 ? 0.3 : courants[j], j < 0, e, &record)) return driver_error(&record);
+            printf("  %.1e %.1e %.3f", e[0], e[1], e[2]);
+        }
+        printf("\n");
+        for (int k = 0; k < 2; k++) {
+            y[k][i] = error[i][COURANTS - 1][k];
+            y[2 + k][i] = k ? P_best[i] : p_best[i];
+            y[4 + k][i] = error[i][COURANTS][k];
+        }
+    }
+    for (int k = 0; k < 6; k++) {
+        const ex_curve curve = { names[k], h, y[k], 4, k < 2 ? 3 : k < 4 ? 2 : 1, k % 2 + 2 * (k / 2) };
+        curves[k] = curve;
+    }
+    axes.title = "swinging cube: errors at t = 0.002 s (001 table 1)";
+    axes.x_label = "h [m]"; axes.y_label = "relative L2 error";
+    axes.log_x = axes.log_y = 1;
+    snprintf(path, sizeof path, "%s/table1.png", folder);
+    if (!ex_make_directory(folder) && !ex_plot(path, 760, 560, &axes, curves, 6)) printf("written to %s\n", path);
+    for (int k = 0; k < 2; k++) order[k] = log(y[k][2] / y[k][3]) / log(1.5);
+    ex_check_true("order_p_x_at_least_2.5", order[0] >= 2.5);
+    ex_check_true("order_P_xX_at_least_2.5", order[1] >= 2.5);
+    ex_result("order_p_x", order[0], "1");
+    ex_result("order_P_xX", order[1], "1");
+    ex_result("time_by_6_neighbours_RK2", error[3][COURANTS - 1][2] / error[3][COURANTS][2], "1");
+    return ex_exit_code();
 }
 
 static int run_cube(const swinging_cube_parameters *p) {
@@ -97,7 +171,9 @@ static int run_cube(const swinging_cube_parameters *p) {
 
 int main(int argc, char **argv) {
     swinging_cube_parameters p;
+    int study = 0;
     const ex_option own[] = {
+        { "study", EX_FLAG, &study, NULL, NULL, 0, 0, "table 1: four spacings, four CFL numbers" },
         { "n", EX_INT, &p.n, NULL, NULL, 2, 512, "spacings a side of 1 m" },
         { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45, "moves inner particles (support then 0.9 or more, not sharp)" },
         { "amplitude", EX_REAL, &p.amplitude, "m", NULL, 1e-12, 0.1, "U0; 001 uses 5e-4" },
@@ -107,5 +183,5 @@ int main(int argc, char **argv) {
     swinging_cube_default(&p);
     driver_arguments(argc, argv, "swinging_cube", "swinging cube with an exact solution (001 section 7.1)", &p.options,
                      own, (int)(sizeof own / sizeof *own));
-    return run_cube(&p);
+    return study ? run_study(&p) : run_cube(&p);
 }

@@ -143,6 +143,9 @@ static void cube_errors(int sharp, const double p_limit[3], const double P_limit
         swinging_cube cube;
         swinging_cube_default(&p);
         p.options.threads = 1;
+        p.options.operator_kind = TLSPH_CORRECTED_KERNEL;
+        p.options.integrator = TLSPH_RK2;
+        p.options.cfl = 0.3;
         p.options.sharp = sharp;
         p.n = 4 << i;
         REQUIRE_OK(swinging_cube_create(&p, &cube, NULL));

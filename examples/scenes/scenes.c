@@ -55,8 +55,8 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = real("cfl", &o->cfl, "", 1e-6, 1, "Courant number (000-78)");
     table[i++] = choice("unknowns", &o->unknowns, "pF|pFJ|pFHJ|pFH", "deformation measures that are evolved");
     table[i++] = choice("thermal", &o->thermal, "isothermal|energy|entropy", "thermal unknown that is evolved");
-    table[i++] = choice("operator", &o->operator_kind, "corrected|cells|W0|W1|bond0|bond",
-                        "corrected kernel, dual faces of cells; 002: kernels of order 0 and 1, with bonds");
+    table[i++] = choice("operator", &o->operator_kind, "corrected|cells|W0|W1|bond0|bond|cells4",
+                        "corrected kernel, dual faces of cells, the same of order 4; 002: kernels of order 0 and 1, with bonds");
     table[i++] = choice("kernel", &o->kernel, "cubic|quadratic|wendland2|wendland4", "of the operators with kernels");
     table[i++] = real("support", &o->support, "spacings", 0.5, 4, "smoothing length h; neighbours within 2h");
     table[i++] = choice("dissipation", &o->dissipation, "limited|reconstructed|first|printed|jst|none", "upwinding");
