@@ -29,6 +29,7 @@ static bending_column_parameters scheme_parameters(const bending_column_paramete
         p.options.operator_kind = (int)TLSPH_CELLS;
         p.options.integrator = given->options.integrator;
         p.options.cfl = given->options.cfl;
+        p.options.threads = given->options.threads;
         p.options.end_time = given->options.end_time;
         p.options.quiet = given->options.quiet;
         p.options.output = given->options.output;
@@ -187,7 +188,7 @@ int main(int argc, char **argv) {
     bending_column_default(p);
     p->options.step_rule = (int)TLSPH_STEP_BY_PAIR;
     p->options.cfl = 0.6;
-    p->options.end_time = 0.12;
+    p->options.end_time = 0.1;
     s.stability = 1;
     driver_arguments(argc, argv, "bending_column", "energy of a bending column (002 section 5.3)", &p->options, own,
                      (int)(sizeof own / sizeof *own));

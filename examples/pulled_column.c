@@ -89,16 +89,84 @@ static int run_column(const pulled_column_parameters *p) {
     return code;
 }
 
+/* ---- study: elongation at failure by gradient, force and dissipation, beside the paper's ------------------------- */
+
+enum { OWN, BONDS, KERNEL, BONDS_PRINTED, KERNEL_PRINTED, FIRST_ORDER, SCHEMES, RATIOS = 2 };
+static const char *const scheme_keys[SCHEMES] = { "own", "bonds", "kernel", "bonds_printed_force", "kernel_printed_force",
+                                                  "bonds_first_order_dissipation" };
+static const double ratios[RATIOS] = { 0.45, 0.495 };
+static const double paper[2][RATIOS] = { { 526.80, 464.50 }, { 421.90, 427.58 } }; /* figure 20: bonds, JST-SPH */
+
+static pulled_column_parameters scheme_parameters(const pulled_column_parameters *given, int scheme, double poisson) {
+    pulled_column_parameters p = *given;
+    p.poisson = poisson;
+    if (scheme == OWN) return p;
+    scene_options_of_002(&p.options, 1.0 / 64);
+    p.centred = 1;
+    if (scheme == KERNEL || scheme == KERNEL_PRINTED) p.options.operator_kind = TLSPH_FIRST_KERNEL;
+    if (scheme == BONDS_PRINTED || scheme == KERNEL_PRINTED) p.options.force_form = TLSPH_FORCE_AS_PRINTED;
+    if (scheme == FIRST_ORDER) p.options.dissipation = TLSPH_FIRST_ORDER;
+    return p;
+}
+
+/* Elongation at failure, or at the end of the pull, percent. */
+static double elongation_of(const pulled_column_parameters *p, int *failed) {
+    static pulled_column column;
+    tlsph_error error;
+    *failed = 1;
+    if (pulled_column_create(p, &column, &error) != TLSPH_OK) { driver_error(&error); return 0; }
+    *failed = tlsph_advance(column.body.solver, (tlsph_real)pulled_column_end(p)) != TLSPH_OK;
+    const double elongation = pulled_column_elongation(&column);
+    scene_destroy(&column.body);
+    return elongation;
+}
+
+static int run_study(const pulled_column_parameters *given) {
+    static double reached[RATIOS][SCHEMES], place[SCHEMES], paper_place[2] = { BONDS, KERNEL };
+    double published[RATIOS][2];
+    ex_curve curves[2 * RATIOS];
+    ex_axes axes;
+    const char *folder = given->options.output[0] ? given->options.output : "out/pulled_column";
+    char key[96], path[600];
+    for (int r = 0; r < RATIOS; r++)
+        for (int scheme = 0; scheme < SCHEMES; scheme++) {
+            const pulled_column_parameters p = scheme_parameters(given, scheme, ratios[r]);
+            int failed;
+            place[scheme] = scheme;
+            reached[r][scheme] = elongation_of(&p, &failed);
+            snprintf(key, sizeof key, "elongation_%s_%g%s", scheme_keys[scheme], ratios[r], failed ? "" : "_at_least");
+            ex_result(key, reached[r][scheme], "percent");
+            if (scheme == OWN) ex_check_true(r ? "own_reaches_the_end_0.495" : "own_reaches_the_end_0.45", !failed);
+        }
+    for (int r = 0; r < RATIOS; r++) {
+        for (int i = 0; i < 2; i++) published[r][i] = paper[i][r];
+        const ex_curve here = { r ? "nu = 0.495" : "nu = 0.45", place, reached[r], SCHEMES, 3, r };
+        const ex_curve there = { r ? "paper, 0.495" : "paper, 0.45", paper_place, published[r], 2, 2, 2 + r };
+        curves[2 * r] = here;
+        curves[2 * r + 1] = there;
+    }
+    memset(&axes, 0, sizeof axes);
+    axes.title = "elongation at failure or end";
+    axes.x_label = "0 own, 1 bonds, 2 kernel, 3 and 4 printed forces, 5 first order";
+    axes.y_label = "[%]";
+    if (ex_make_directory(folder)) return 1;
+    snprintf(path, sizeof path, "%s/study.png", folder);
+    ex_plot(path, 720, 460, &axes, curves, 2 * RATIOS);
+    return ex_exit_code();
+}
+
 int main(int argc, char **argv) {
     pulled_column_parameters p;
+    int study = 0;
     const ex_option own[] = {
         { "n", EX_INT, &p.n, NULL, NULL, 2, 64, "spacings across the width of 1 m; 002: 12, centred" },
         { "nu", EX_REAL, &p.poisson, NULL, NULL, -0.9, 0.49999, "Poisson's ratio; 002: 0.45 and 0.495" },
         { "elongation", EX_REAL, &p.elongation, "percent", NULL, 1, 1e5, "at which the pull ends" },
         { "speed", EX_REAL, &p.speed, "m/s", NULL, 1e-3, 1e4, "of the head" },
-        { "placement", EX_CHOICE, &p.centred, NULL, "faces|centred", 0, 0, "particles on faces or at cell centres" } };
+        { "placement", EX_CHOICE, &p.centred, NULL, "faces|centred", 0, 0, "particles on faces or at cell centres" },
+        { "study", EX_FLAG, &study, NULL, NULL, 0, 0, "elongation at failure of six schemes at nu = 0.45 and 0.495" } };
     pulled_column_default(&p);
     driver_arguments(argc, argv, "pulled_column", "column pulled until it fails (002 section 5.4)", &p.options, own,
                      (int)(sizeof own / sizeof *own));
-    return run_column(&p);
+    return study ? run_study(&p) : run_column(&p);
 }

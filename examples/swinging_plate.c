@@ -193,6 +193,7 @@ int main(int argc, char **argv) {
     swinging_plate_default(p);
     scene_options_of_002(&p->options, 0.125);
     p->options.projection = 1;
+    p->options.cfl = 0.5;
     p->options.end_time = 0.009838; /* a quarter of the period at nu = 0.495: the displacement is largest */
     p->n = 8;
     s.levels = 3;

@@ -10,6 +10,7 @@ void scene_options_of_002(scene_options *o, double biharmonic) {
     o->dissipation = (int)TLSPH_JST;
     o->harmonic = 0;
     o->biharmonic = biharmonic;
+    o->threads = 1; /* small scenes run best on one */
     o->integrator = (int)TLSPH_SSP_RK3;
     o->projection = 0;
 }

@@ -9,7 +9,7 @@ void spinning_box_default(spinning_box_parameters *p, int dimension) {
     scene_options_of_002(&p->options, 0.125);
     p->options.end_time = dimension == 2 ? 0.2 : 0.1;
     p->dimension = dimension;
-    p->n = dimension == 2 ? 32 : 10;
+    p->n = dimension == 2 ? 24 : 10;
     p->spin = 105;
     p->young = 17e6; p->poisson = dimension == 2 ? 0.45 : 0.3; p->density = 1100;
 }
