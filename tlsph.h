@@ -61,8 +61,8 @@ PROMISES
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
-  [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION]
-  [SELF-TEST] [PREFLIGHT] [VORONOI] [FILL] [REPRODUCING] [LICENCE]
+  [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION]
+  [CREATION] [SELF-TEST] [PREFLIGHT] [VORONOI] [FILL] [REPRODUCING] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -397,6 +397,9 @@ typedef struct tlsph_desc {
     tlsph_real jump_share;               /* a_J, factor of the dissipation of J, default 0.5 */
     tlsph_real drift_relaxation;         /* r0: relaxation of J to det F, default 0; 0.5 for long static loads */
     tlsph_conduction conduction;         /* default TLSPH_COMPACT */
+    int conduction_stages;               /* 0 (default): heat moves with everything else, in steps of h^2. 3 or more: where
+                                            that is shorter than the sound limit, conduction takes up to so many cheap
+                                            stages of its own in each half step (see SUPER-STEPS) */
     int sharp_gradients;                 /* 1: fourth-order dispersion on lattices, twice the cost; default 0. Needs an
                                             antisymmetric operator: cells, given, or a box lattice with support 0.6 */
     int tight_closure;                   /* 1: TLSPH_CLOSED exact for linear fields to 3e-4, not 2e-2; default 0 */
@@ -3004,7 +3007,7 @@ typedef struct tlsphi_block {
     uint32_t begin, end, body;
     uint32_t failed; /* first bad particle of the block, or TLSPHI_NONE */
     tlsph_result failure;
-    double time_step; /* stable step of its particles, s */
+    double time_step, heat_step; /* stable step of its particles, s; of conduction alone, where that is split off */
     double sums[TLSPHI_SUMS];
     double moments[TLSPHI_MOMENTS];
 } tlsphi_block;
@@ -3061,8 +3064,17 @@ typedef struct tlsphi_image {
     tlsph_real c;
 } tlsphi_image;
 
+/* Conduction in stages of its own, see [SUPER-STEPS]: temperatures at the beginning, of the last two stages, rates at the
+   beginning and of heat loads, and E before the step. */
+typedef struct tlsphi_super {
+    int most; /* stages a half step; 0: off, no arrays */
+    tlsph_real *first, *previous, *current, *rate, *source, *E;
+} tlsphi_super;
+
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user, has_plastic;
+    int heat_moves; /* the fluxes hold conduction: conducts, but for the mechanical part of a split step */
+    tlsphi_super super;
     int audit, projection, dissipation_heats, retries, threads, bonds;
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
     int parted;        /* stresses and dissipation are gathered apart: frozen, or over different pairs */
@@ -3308,9 +3320,10 @@ static const tlsphi_mirror *tlsphi_mirrors_of(const tlsph_solver *s, size_t a) {
 #define TLSPHI_SHARP_STEP 1.5 /* by which sharp gradients shorten tau: 1.37 times the largest frequency, and a margin */
 
 /* Largest stable step of one particle, s: (78) with the current isentropic speed, and the diffusive limit. */
-static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi_point *pt) {
+static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi_point *pt, double *heat) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     double tau = (double)s->tau[a], dt = TLSPHI_LARGEST;
+    *heat = TLSPHI_LARGEST;
     if (pt->c_p > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE) dt = (double)s->cfl * tau / (double)pt->c_p;
     if (s->sharp) tau *= TLSPHI_SHARP_STEP; /* sharp gradients are for v only: heat keeps its stencil */
     if (s->conducts && m->h > 0) {
@@ -3319,9 +3332,9 @@ static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi
             for (int j = 0; j < 3; j++)
                 HtH[3 * i + j] = pt->H[i] * pt->H[j] + pt->H[3 + i] * pt->H[3 + j] + pt->H[6 + i] * pt->H[6 + j];
         const tlsph_real K = m->h / pt->J * tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
-        dt = tlsphi_dmin(dt, 0.8 * (double)m->c_v * tau * tau / (2 * s->dim * (double)K));
+        *heat = 0.8 * (double)m->c_v * tau * tau / (2 * s->dim * (double)K);
     }
-    return dt;
+    return s->super.most ? dt : tlsphi_dmin(dt, *heat);
 }
 
 /* Writes what neighbours read. */
@@ -3388,7 +3401,7 @@ static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
     tlsph_response user[TLSPHI_CHUNK];
     tlsphi_point pt;
     block->failed = TLSPHI_NONE;
-    block->time_step = TLSPHI_LARGEST;
+    block->time_step = block->heat_step = TLSPHI_LARGEST;
     for (size_t begin = block->begin; begin < block->end; begin += TLSPHI_CHUNK) {
         const size_t end = begin + TLSPHI_CHUNK < block->end ? begin + TLSPHI_CHUNK : block->end;
         if (s->has_user) tlsphi_user_responses(s, begin, end, user);
@@ -3405,7 +3418,9 @@ static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
                 tlsphi_stretches(pt.F, stretches);
                 s->least_stretch[a] = (tlsph_real)stretches[2];
             }
-            block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, a, &pt));
+            double heat;
+            block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, a, &pt, &heat));
+            block->heat_step = tlsphi_dmin(block->heat_step, heat);
         }
     }
 }
@@ -3722,7 +3737,7 @@ static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
     return s->image + low;
 }
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
-    const int with_S = s->grad_S && s->damps, with_theta = s->grad_theta != NULL;
+    const int with_S = s->grad_S && s->damps, with_theta = s->heat_moves;
     const int with_w = s->projection && (s->damps || s->rate_E); /* w and Sigma_J are there for the dissipation and E */
     const tlsphi_image *image = tlsphi_find_image(s, block->begin), *last = s->image + s->images;
     for (size_t a = block->begin; a < block->end; a++) {
@@ -4016,7 +4031,7 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int 
                 tlsphi_multiply(dim, P, rest, t);
                 for (int i = 0; i < dim; i++) sum->T[i] += t[i];
             }
-            if (thermal && s->conducts) tlsphi_pair_heat(s, a, b, g, C, rest, dim, thermal, sum);
+            if (thermal && s->heat_moves) tlsphi_pair_heat(s, a, b, g, C, rest, dim, thermal, sum);
         }
         if (!(parts & TLSPHI_DAMPING)) continue;
         if (plain) {
@@ -4085,7 +4100,7 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
     tlsph_real rate = sum->heat * inverse;
     block[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)(sum->production / (2 * theta));
     block[TLSPHI_SUM_CONDUCTION_ENTROPY] += (double)sum->conduction;
-    if (s->conducts) { /* -Q.grad theta/theta^2, the source of (57) */
+    if (s->heat_moves) { /* -Q.grad theta/theta^2, the source of (57) */
         const tlsph_real source = sum->source / (2 * theta);
         block[TLSPHI_SUM_CONDUCTION_ENTROPY] += (double)source;
         if (s->thermal == TLSPH_ENTROPY) rate += source * inverse;
@@ -4274,12 +4289,16 @@ static void tlsphi_apply_force(tlsph_solver *s, const tlsphi_load *load, const t
     }
 }
 
+/* Heat of a load into its i-th particle, W. */
+static tlsph_real tlsphi_heat_power(const tlsph_solver *s, const tlsphi_load *load, size_t i) {
+    return load->given.kind == TLSPH_HEAT_FLUX ? -load->values[i] * load->area[i]
+                                               : load->values[i] * s->V[load->inner[i]];
+}
 static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
         const tlsph_real theta = s->theta[a];
-        const tlsph_real power =
-            load->given.kind == TLSPH_HEAT_FLUX ? -load->values[i] * load->area[i] : load->values[i] * s->V[a];
+        const tlsph_real power = tlsphi_heat_power(s, load, i);
         s->rate_E[a] += power / s->V[a] / (s->thermal == TLSPH_ENTROPY ? theta : 1);
         s->account.external_heat += stage->rate_weight * dt * (double)power;
         s->account.external_entropy += stage->rate_weight * dt * (double)(power / theta);
@@ -4310,6 +4329,7 @@ static void tlsphi_apply_loads(tlsph_solver *s, const tlsphi_stage *stage, doubl
         tlsphi_load *load = s->load + i;
         const tlsph_condition_kind kind = load->given.kind;
         if (kind == TLSPH_VELOCITY || kind == TLSPH_TEMPERATURE || kind == TLSPH_WALL) continue;
+        if (tlsphi_is_thermal(kind) && s->heat_moves < s->conducts) continue; /* heats in the conduction's own stages */
         tlsphi_load_values(s, load, s->time + stage->start * dt);
         if (tlsphi_is_thermal(kind)) tlsphi_apply_heat(s, load, stage, dt);
         else tlsphi_apply_force(s, load, stage, dt);
@@ -5061,6 +5081,190 @@ TLSPHI_DEF tlsph_result tlsph_pressure_report_read(const tlsph_solver *s, tlsph_
     return TLSPH_OK;
 }
 
+/* ==== [SUPER-STEPS] ================================================================================================
+   Conduction limits explicit steps to about c_v h^2/(2 d K), which on fine bodies is far below the sound limit. Where the
+   description asks, a step is split in three: conduction for dt/2, everything else with adiabatic particles for dt,
+   conduction for dt/2. Each conduction is one super-step of the stabilised scheme RKL2 (Meyer, Balsara and Aslam, J. Comput.
+   Phys. 257 (2014) 594), of second order: m stages of two light gathers reach (m^2 + m - 2)/4 explicit steps. The recursion
+   is linear in the rates, so heat is conserved to round-off; deformation and momentum do not change meanwhile, and the
+   mechanical part is adiabatic, so no order of the parts can make entropy vanish (Armero and Simo, Int. J. Numer. Meth.
+   Engrg. 35 (1992) 737).
+   What it gives up: waves that exchange their heat within one step (k^2 K dt/c_v > 1) are stressed adiabatically during
+   the step and relax after it, a viscosity delta c^2 dt/2 of first order. Longer waves keep second order. */
+
+/* How many explicit steps m stages are worth. */
+static double tlsphi_super_reach(int m) { return ((double)m * m + m - 2) / 4; }
+static double tlsphi_heat_step(const tlsph_solver *s) {
+    double dt = TLSPHI_LARGEST;
+    for (size_t i = 0; i < s->blocks; i++) dt = tlsphi_dmin(dt, s->block[i].heat_step);
+    return dt;
+}
+
+TLSPHI_INLINE void tlsphi_theta_gradient(tlsph_solver *s, size_t a, const int dim) {
+    const size_t D = (size_t)dim;
+    const tlsph_real half = 1 / (2 * s->V[a]);
+    tlsph_real grad[3] = {0, 0, 0};
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const tlsph_real jump = (s->theta[s->neighbour[k]] - s->theta[a]) * half;
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) grad[i] += jump * s->g[D * k + (size_t)i];
+    }
+    tlsphi_store_slope(s, a, dim, grad, s->grad_theta + D * a);
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
+        if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, s->grad_theta + D * a);
+    tlsphi_heat_flux(s, a);
+}
+static void tlsphi_theta_gradient_block(tlsph_solver *s, tlsphi_block *block) {
+    for (size_t a = block->begin; a < block->end; a++) {
+        if (s->dim == 3) tlsphi_theta_gradient(s, a, 3);
+        else tlsphi_theta_gradient(s, a, 2);
+    }
+}
+/* rate_E becomes d theta/dt, K/s. */
+TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
+    const size_t D = (size_t)dim, dd = D * D;
+    tlsphi_gathered sum;
+    memset(&sum, 0, sizeof sum);
+    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+        const size_t b = s->neighbour[k];
+        const tlsph_real *g = s->g + D * k, *C = g;
+        const tlsph_real *rest = s->rest && s->force_form == TLSPH_ADJOINT ? s->rest + D * k : NULL;
+        tlsph_real skew[3];
+        if (s->M) {
+            tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
+            C = skew;
+        }
+        tlsphi_pair_heat(s, a, b, g, C, rest, dim, TLSPH_ENERGY, &sum);
+    }
+    s->rate_E[a] = sum.heat / (s->V[a] * tlsphi_material_of(s, a)->c_v) + s->super.source[a];
+}
+static void tlsphi_theta_rate_block(tlsph_solver *s, tlsphi_block *block) {
+    for (size_t a = block->begin; a < block->end; a++) {
+        if (s->dim == 3) tlsphi_theta_rate(s, a, 3);
+        else tlsphi_theta_rate(s, a, 2);
+    }
+}
+
+/* Rates of all heat loads, at the middle of the super-step. */
+static void tlsphi_super_loads(tlsph_solver *s, double time, double dt) {
+    memset(s->super.source, 0, s->n * sizeof *s->super.source);
+    for (size_t k = 0; k < s->loads; k++) {
+        tlsphi_load *load = s->load + k;
+        if (load->given.kind != TLSPH_HEAT_FLUX && load->given.kind != TLSPH_HEAT_SOURCE) continue;
+        tlsphi_load_values(s, load, time + dt / 2);
+        for (size_t i = 0; i < load->given.count; i++) {
+            const size_t a = load->inner[i];
+            const tlsph_real power = tlsphi_heat_power(s, load, i);
+            s->super.source[a] += power / (s->V[a] * tlsphi_material_of(s, a)->c_v);
+            s->account.external_heat += dt * (double)power;
+        }
+    }
+}
+/* The entropy that came with them, at mean temperatures. */
+static double tlsphi_super_load_entropy(const tlsph_solver *s, double dt) {
+    double entropy = 0;
+    for (size_t k = 0; k < s->loads; k++) {
+        const tlsphi_load *load = s->load + k;
+        if (load->given.kind != TLSPH_HEAT_FLUX && load->given.kind != TLSPH_HEAT_SOURCE) continue;
+        for (size_t i = 0; i < load->given.count; i++) {
+            const size_t a = load->inner[i];
+            entropy += 2 * dt * (double)(tlsphi_heat_power(s, load, i) / (s->super.first[a] + s->super.current[a]));
+        }
+    }
+    return entropy;
+}
+/* Neighbours see prescribed temperatures; the recursion of the particle itself goes on freely, so that the difference at
+   the end is the heat that holding it has cost. `book`: take that into the account and end the recursion there. */
+static double tlsphi_super_hold(tlsph_solver *s, double time, int book) {
+    double entropy = 0;
+    for (size_t k = 0; k < s->loads; k++) {
+        tlsphi_load *load = s->load + k;
+        if (load->given.kind != TLSPH_TEMPERATURE) continue;
+        tlsphi_load_values(s, load, time);
+        for (size_t i = 0; i < load->given.count; i++) {
+            const size_t a = load->inner[i];
+            s->theta[a] = load->values[i];
+            if (!book) continue;
+            const double gain = (double)((s->theta[a] - s->super.current[a]) * s->V[a] * tlsphi_material_of(s, a)->c_v);
+            s->account.external_heat += gain;
+            entropy += gain / (double)s->theta[a];
+            s->super.current[a] = s->theta[a];
+        }
+    }
+    return entropy;
+}
+
+/* Y_j = mu Y_j-1 + nu Y_j-2 + (1 - mu - nu) Y_0 + dt (now L(Y_j-1) + then L(Y_0)) */
+typedef struct tlsphi_super_stage {
+    tlsph_solver *s;
+    int number;
+    tlsph_real mu, nu, now, then; /* the last two times dt */
+} tlsphi_super_stage;
+
+static tlsphi_super_stage tlsphi_super_weights(tlsph_solver *s, int j, int m, double dt) {
+    tlsphi_super_stage out;
+    double b[3]; /* of the stages j, j - 1, j - 2 */
+    for (int i = 0; i < 3; i++) {
+        const double l = j - i;
+        b[i] = l < 2 ? 1.0 / 3.0 : (l * l + l - 2) / (2 * l * (l + 1));
+    }
+    const double w = dt / tlsphi_super_reach(m), mu = j > 1 ? (2 - 1.0 / j) * b[0] / b[1] : 1;
+    out.s = s;
+    out.number = j;
+    out.mu = (tlsph_real)mu;
+    out.nu = (tlsph_real)(j > 1 ? (1.0 / j - 1) * b[0] / b[2] : 0);
+    out.now = (tlsph_real)(j > 1 ? mu * w : w * b[0]);
+    out.then = (tlsph_real)(j > 1 ? (b[1] - 1) * mu * w : 0);
+    return out;
+}
+static void tlsphi_super_task(void *arg, size_t i) {
+    const tlsphi_super_stage *stage = (const tlsphi_super_stage *)arg;
+    tlsph_solver *s = stage->s;
+    tlsphi_super *y = &s->super;
+    const tlsph_real rest = 1 - stage->mu - stage->nu;
+    for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
+        if (stage->number == 1) {
+            y->first[a] = y->previous[a] = y->current[a] = s->theta[a];
+            y->rate[a] = s->rate_E[a];
+        }
+        const tlsph_real next = stage->mu * y->current[a] + stage->nu * y->previous[a] + rest * y->first[a] +
+                                stage->now * s->rate_E[a] + stage->then * y->rate[a];
+        y->previous[a] = y->current[a];
+        y->current[a] = s->theta[a] = next;
+    }
+}
+/* E or eta from the new temperatures, and the entropy that was made. */
+static void tlsphi_super_finish(tlsph_solver *s, tlsphi_block *block) {
+    double made = 0;
+    for (size_t a = block->begin; a < block->end; a++) {
+        const tlsph_real c_v = tlsphi_material_of(s, a)->c_v, was = s->super.first[a], is = s->super.current[a];
+        const tlsph_real gain = is > 0 ? c_v * tlsphi_log(is / was) : 0; /* if not, the evaluation reports it */
+        made += (double)(s->V[a] * gain);
+        s->now.E[a] += s->thermal == TLSPH_ENTROPY && is > 0 ? gain : c_v * (is - was);
+    }
+    block->sums[TLSPHI_SUM_CONDUCTION_ENTROPY] = made;
+}
+/* Conduction alone from `time` for dt. Returns the first failed block of the evaluation after it, or NULL. */
+static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double dt) {
+    int m = 3;
+    double entropy = 0, made = 0;
+    tlsphi_super_loads(s, time, dt);
+    while (tlsphi_super_reach(m) * tlsphi_heat_step(s) < dt * (1 - 1e-9) && m < s->super.most) m += 2;
+    for (int j = 1; j <= m; j++) {
+        tlsphi_super_stage stage = tlsphi_super_weights(s, j, m, dt);
+        const double reached = j > 1 ? tlsphi_super_reach(j) / tlsphi_super_reach(m) : 1 / (3 * tlsphi_super_reach(m));
+        tlsphi_run(s, tlsphi_theta_gradient_block);
+        tlsphi_run(s, tlsphi_theta_rate_block);
+        tlsphi_run_tasks(s, tlsphi_super_task, &stage);
+        entropy += tlsphi_super_hold(s, time + reached * dt, j == m);
+    }
+    tlsphi_run(s, tlsphi_super_finish);
+    entropy += tlsphi_super_load_entropy(s, dt);
+    for (size_t i = 0; i < s->blocks; i++) made += s->block[i].sums[TLSPHI_SUM_CONDUCTION_ENTROPY];
+    s->account.external_entropy += entropy;
+    s->account.conduction_entropy += made - entropy;
+    return tlsphi_evaluate(s);
+}
+
 /* ==== [STEP] =======================================================================================================
    Runge-Kutta schemes as tables, geometry in the same scheme.
 
@@ -5162,6 +5366,7 @@ static void tlsphi_restore_state(tlsph_solver *s) {
 TLSPHI_DEF tlsph_real tlsph_stable_time_step(const tlsph_solver *s) {
     double dt = s->jst_step;
     for (size_t i = 0; i < s->blocks; i++) dt = tlsphi_dmin(dt, s->block[i].time_step);
+    if (s->super.most) dt = tlsphi_dmin(dt, 2 * tlsphi_super_reach(s->super.most) * tlsphi_heat_step(s));
 #ifdef TLSPH_REAL_FLOAT
     dt = tlsphi_dmin(dt, 3e38);
 #endif
@@ -5193,9 +5398,24 @@ TLSPHI_DEF tlsph_real tlsph_cfl_limit(tlsph_integrator integrator) {
 }
 
 /* Algorithm 1, from state n to n + 1. */
+static tlsph_result tlsphi_give_up(tlsph_solver *s, const tlsphi_block *bad, int split) {
+    const tlsph_result result = tlsphi_describe_failure(s, bad, "step");
+    if (split) memcpy(s->old.E, s->super.E, s->n * sizeof *s->old.E);
+    s->heat_moves = s->conducts;
+    tlsphi_restore_state(s);
+    return result;
+}
 static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     const tlsphi_scheme *scheme = tlsphi_schemes + s->integrator;
+    const int split = s->super.most && dt > tlsphi_heat_step(s);
     tlsphi_keep_state(s); /* (1) u_old, x_old                     */
+    if (split) {
+        const tlsphi_block *bad = tlsphi_conduct(s, s->time, dt / 2);
+        memcpy(s->super.E, s->old.E, s->n * sizeof *s->old.E);
+        memcpy(s->old.E, s->now.E, s->n * sizeof *s->old.E);
+        if (bad) return tlsphi_give_up(s, bad, 1);
+        s->heat_moves = 0;
+    }
     for (int k = 0; k < scheme->stages; k++) {
         const tlsphi_stage *stage = scheme->stage + k;
         s->damps = k == 0 || !s->frozen;
@@ -5208,11 +5428,12 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
             return s->error.result;
         }
         const tlsphi_block *bad = tlsphi_evaluate(s); /* (8) stress, (9) temperature          */
-        if (bad) {
-            const tlsph_result result = tlsphi_describe_failure(s, bad, "step");
-            tlsphi_restore_state(s);
-            return result;
-        }
+        if (bad) return tlsphi_give_up(s, bad, split);
+    }
+    s->heat_moves = s->conducts;
+    if (split) {
+        const tlsphi_block *bad = tlsphi_conduct(s, s->time + dt / 2, dt / 2);
+        if (bad) return tlsphi_give_up(s, bad, 1);
     }
     s->step++;
     s->last_dt = dt;
@@ -5733,6 +5954,7 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"biharmonic", (double)d->biharmonic, 0, 100, "0 to 100"},
         {"force_form", (double)d->force_form, TLSPH_ADJOINT, TLSPH_FORCE_AS_PRINTED, "a tlsph_force_form"},
         {"retries", (double)d->retries, 0, 30, "0 to 30"},
+        {"conduction_stages", (double)(d->conduction_stages ? d->conduction_stages : 3), 3, 1000, "0, or 3 to 1000"},
         {"step_rule", (double)d->step_rule, TLSPH_STEP_BY_PARTICLE, TLSPH_STEP_BY_PAIR_LINEAR, "a tlsph_step_rule"},
         {"volume_coupling", (double)d->volume_coupling, TLSPH_SPLIT, TLSPH_JOINT_AS_PRINTED, "a tlsph_volume_coupling"},
         {"drift_stiffness", (double)d->drift_stiffness, 0, 1e6, "0 to 1e6"},
@@ -6052,6 +6274,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->has_user |= d->materials[i].kind == TLSPH_USER;
         s->has_plastic |= d->materials[i].kind == TLSPH_VON_MISES;
     }
+    s->heat_moves = s->conducts;
+    s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
 }
 
@@ -6121,6 +6345,11 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
         s->grad_theta = TLSPHI_TAKE(arena, tlsph_real, D * n);
         s->heat = TLSPHI_TAKE(arena, tlsph_real, D * n);
         s->h_J = TLSPHI_TAKE(arena, tlsph_real, n);
+    }
+    if (s->super.most) {
+        tlsph_real **const arrays[6] = {&s->super.first, &s->super.previous, &s->super.current,
+                                        &s->super.rate,  &s->super.source,   &s->super.E};
+        for (int i = 0; i < 6; i++) *arrays[i] = TLSPHI_TAKE(arena, tlsph_real, n);
     }
 }
 static void tlsphi_layout_pressure(tlsph_solver *s, tlsphi_arena *arena) {

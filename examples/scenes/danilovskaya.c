@@ -23,6 +23,7 @@ void danilovskaya_default(danilovskaya_parameters *p) {
     scene_options_default(&p->options);
     p->options.thermal = TLSPH_ENERGY;
     p->options.threads = 1; /* a few hundred particles: threads would wait for each other */
+    p->options.conduction_stages = 9; /* steps of sound instead of h^2: ten times as fast, the same errors */
     p->options.sharp = 1; /* half the dispersion error and half the overshoot at the front */
     p->problem = DANILOVSKAYA_FIRST;
     p->delta = 1;
@@ -65,12 +66,14 @@ static void ramp_temperature(void *user, tlsph_real time, size_t count, const ui
     for (size_t i = 0; i < count; i++) values[i] = (tlsph_real)(bar->T0 + share * bar->theta_unit);
 }
 
-/* The flux of the step's beginning: first order in time, but steps are as short as h^2. */
+/* The surface's temperature is that of the step's beginning, carried on with its last rate. */
 static void surface_flux(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
                          const tlsph_real *x, tlsph_real *values) {
     const danilovskaya *bar = user;
-    const double flux = DANILOVSKAYA_TRANSFER * (1 - bar->surface) * bar->flux_unit;
-    (void)time; (void)particle; (void)X; (void)x;
+    const double since = (double)time / bar->time_unit + bar->start - bar->surface_time;
+    const double theta = bar->surface + bar->surface_rate * since;
+    const double flux = DANILOVSKAYA_TRANSFER * (1 - theta) * bar->flux_unit;
+    (void)particle; (void)X; (void)x;
     for (size_t i = 0; i < count; i++) values[i] = (tlsph_real)-flux;
 }
 
@@ -151,8 +154,12 @@ double danilovskaya_time(const danilovskaya *bar) {
 
 static void look_at_surface(danilovskaya *bar) {
     tlsph_real *theta = scene_read(bar->body.solver, TLSPH_FIELD_TEMPERATURE);
-    if (theta)
-        bar->surface = ((double)theta[bar->line[0]] - bar->T0) / bar->theta_unit;
+    if (theta) {
+        const double now = ((double)theta[bar->line[0]] - bar->T0) / bar->theta_unit, t = danilovskaya_time(bar);
+        bar->surface_rate = t > bar->surface_time ? (now - bar->surface) / (t - bar->surface_time) : 0;
+        bar->surface = now;
+        bar->surface_time = t;
+    }
     free(theta);
 }
 

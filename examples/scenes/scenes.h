@@ -26,14 +26,14 @@ typedef struct scene_options {
     double cfl, support, harmonic, biharmonic;
     int unknowns, thermal, operator_kind, kernel, dissipation, volume_coupling, conduction, integrator;
     int force_form, step_rule;
-    int sharp, projection, audit, threads;
+    int conduction_stages, sharp, projection, audit, threads;
     int scheme, pressure_iteration, laplacian_as_printed; /* TLSPH_INCOMPRESSIBLE: unknowns lose their J */
     double laplacian;
     int frames, quiet, check;    /* used by drivers only */
     const char *output;
 } scene_options;
 
-#define SCENE_OPTION_COUNT 26
+#define SCENE_OPTION_COUNT 27
 
 /* The library's own defaults, no end time, one frame. */
 void scene_options_default(scene_options *options);
@@ -394,7 +394,7 @@ typedef struct danilovskaya {
     size_t sections;        /* particles along the bar */
     size_t *line;           /* their numbers on one edge, in order of y */
     double start, ramp;     /* t at the solver's time 0; length of the rise of the temperature */
-    double surface;         /* theta at y = 0 at the beginning of the step: the second problem's flux needs it */
+    double surface, surface_rate, surface_time; /* theta at y = 0 as the second problem's flux needs it */
 } danilovskaya;
 
 void danilovskaya_default(danilovskaya_parameters *parameters);
