@@ -85,6 +85,10 @@ typedef void (*scene_state_fn)(const void *scene, const tlsph_real X[3], scene_s
 tlsph_result scene_set_state(scene_body *body, const void *scene, scene_state_fn state);
 void scene_destroy(scene_body *body);
 
+/* Largest difference of displacement and of pressure between particles and their mirror images across X[axis] = 0, by the
+   largest displacement and pressure; infinite where the lattice is not symmetric. */
+double scene_asymmetry(const scene_body *body, int axis);
+
 /* ---- surfaces of lattice bodies ---------------------------------------------------------------------------------- */
 
 /* A face that belongs to one cell only: its corners (particles), middle (m) and outward area vector (m^2). */
@@ -621,5 +625,81 @@ double conduction_exact(const conduction_parameters *parameters, const tlsph_rea
 double conduction_error(const conducting_body *body);
 /* How much of the initial field is left in the inner half: its share in the field now, 1 at the start. */
 double conduction_amplitude(const conducting_body *body);
+
+/* ---- punch test: 000 section 7.4 --------------------------------------------------------------------------------- */
+
+/* A cylinder on a frictionless floor, punched from above at near incompressibility. The figure with the sizes is missing.
+   What the text gives: height H = 1 m, X = (0, 1, 1) m is watched, so that radius 1 m about the Z axis puts it on the upper
+   edge; the cylinder is "perforated", and shown from above: a hole along the axis, whose radius is set to a quarter. It is
+   punched "on the middle-top face": (94) holds around the hole, out to half the radius, and is 0 outside. */
+typedef struct punch_test_parameters {
+    scene_options options;
+    int n;                /* spacings across the diameter, even; 18, 22, 28: near the paper's 2500, 5000, 10000 particles */
+    double radius, height, hole; /* m */
+    double speed;         /* m/s at Z = H, downward */
+    double punch;         /* m; radius of the part that moves at first */
+    double poisson;
+} punch_test_parameters;
+
+typedef struct punch_test {
+    scene_body body;
+    punch_test_parameters parameters;
+    size_t probe;         /* particle at X = (0, 1, 1) m (figure 18) */
+} punch_test;
+
+void punch_test_default(punch_test_parameters *parameters);
+tlsph_result punch_test_create(const punch_test_parameters *parameters, punch_test *out, tlsph_error *error);
+
+/* ---- gripper: 000 section 7.5 ------------------------------------------------------------------------------------ */
+
+/* Four arms from a hollow cylinder. Given: arms to 0.4 m from the centre, cylinder of radius 0.1 m, X = (0.4, 0, -0.03) m
+   watched at an end. So the body lies between Z = -0.03 and 0.03 m. Not given: the width of the arms, set to 0.08 m; the
+   radius of the bore, 0.06 m; what holds it: the wall of the bore, where the temperature is prescribed, is clamped, since
+   the four tractions have a resultant; the sign of the vertical traction: upward. */
+typedef struct gripper_parameters {
+    scene_options options;
+    double spacing;       /* m; 0.02 / integer, so that all faces lie on the lattice */
+    double arm, width, thickness, radius, bore; /* m */
+    double traction;      /* Pa, along Z on the ends of the arms */
+    double cold, hot;     /* K: wall of the bore, for ever; ends of the arms, at t = 0 */
+} gripper_parameters;
+
+typedef struct gripper {
+    scene_body body;
+    gripper_parameters parameters;
+    size_t probe;         /* particle at X = (0.4, 0, -0.03) m (figure 22) */
+} gripper;
+
+void gripper_default(gripper_parameters *parameters);
+tlsph_result gripper_create(const gripper_parameters *parameters, gripper *out, tlsph_error *error);
+
+/* ---- spherical ball: 000 section 7.6 ----------------------------------------------------------------------------- */
+
+/* A free thin-walled ball with an unsymmetrical pattern of holes. The figure with the sizes is missing. 470.871 kW/m^2 is
+   100 kW by 4 pi (0.13 m)^2 (or 1 kW at 13 mm, where 0.042 s would be some hundred swings of the wall and not the few that
+   a sequence of six pictures can show): inner radius 0.13 m. Set here: wall 0.02 m; four holes on the equator, three above
+   it, none below, mirrored at Y = 0 so that this symmetry can be checked; (95) holds on the cap within 30 degrees of the
+   top; the heat enters (positive Q_B of (96) would cool by (36e), but then (93) would cool the disk first, against figure
+   13c). */
+typedef struct spherical_ball_parameters {
+    scene_options options;
+    double inner_radius, wall; /* m */
+    int n;                /* spacings through the wall */
+    double holes[2];      /* degrees, angular radius of the equatorial and of the upper holes; 0: none */
+    double latitude;      /* degrees, of the upper ones */
+    double cap;           /* degrees from the top */
+    double speed;         /* m/s, downward */
+    double heat_flux;     /* W/m^2 on the inner surface, positive = leaves */
+} spherical_ball_parameters;
+
+typedef struct spherical_ball {
+    scene_body body;
+    spherical_ball_parameters parameters;
+    double inner_area;    /* m^2, that takes the heat */
+    size_t probe;         /* particle at the top, outside */
+} spherical_ball;
+
+void spherical_ball_default(spherical_ball_parameters *parameters);
+tlsph_result spherical_ball_create(const spherical_ball_parameters *parameters, spherical_ball *out, tlsph_error *error);
 
 #endif
