@@ -164,8 +164,8 @@ static void check(const run *r) {
 }
 
 static void check_forms(const driver_history probe[2]) {
-    ex_check_below("velocity_E_against_eta", driver_difference(&probe[0], &probe[1], 0), 0.01);
-    ex_check_below("temperature_E_against_eta", driver_difference(&probe[0], &probe[1], 1), 0.01);
+    ex_check_below("velocity_E_against_eta", driver_difference(&probe[0], &probe[1], 0, NULL), 0.01);
+    ex_check_below("temperature_E_against_eta", driver_difference(&probe[0], &probe[1], 1, NULL), 0.01);
 }
 
 /* ---- study: figures 11 and 12 at the paper's resolutions --------------------------------------------------------- */
@@ -221,9 +221,9 @@ static void report_study(const study *s) {
     double to_next[STUDIES][2];
     for (int i = 0; i < STUDIES; i++) {
         printf("%lu particles: E against eta %.2g (v_z), %.2g (temperature) of the range", (unsigned long)s[i].particles,
-               driver_difference(&s[i].probe[0], &s[i].probe[1], 0), driver_difference(&s[i].probe[0], &s[i].probe[1], 1));
+               driver_difference(&s[i].probe[0], &s[i].probe[1], 0, NULL), driver_difference(&s[i].probe[0], &s[i].probe[1], 1, NULL));
         for (int j = 0; i + 1 < STUDIES && j < 2; j++)
-            to_next[i][j] = driver_difference(&s[STUDIES - 1].probe[0], &s[i].probe[0], j);
+            to_next[i][j] = driver_difference(&s[STUDIES - 1].probe[0], &s[i].probe[0], j, NULL);
         if (i + 1 < STUDIES) printf("; to the finest %.2g and %.2g", to_next[i][0], to_next[i][1]);
         printf("\n");
         check_forms(s[i].probe);

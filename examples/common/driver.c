@@ -305,17 +305,20 @@ static double interpolate(const driver_history *h, int column, double t, size_t 
     return (1 - share) * h->values[*at * columns + c] + share * h->values[(*at + 1) * columns + c];
 }
 
-double driver_difference(const driver_history *a, const driver_history *b, int column) {
-    double low = HUGE_VAL, high = -HUGE_VAL, worst = 0;
-    size_t at = 0;
+double driver_difference(const driver_history *a, const driver_history *b, int column, double *rms) {
+    double low = HUGE_VAL, high = -HUGE_VAL, worst = 0, squares = 0;
+    size_t at = 0, i;
+    if (rms) *rms = HUGE_VAL;
     if (!a->count || !b->count) return HUGE_VAL;
-    for (size_t i = 0; i < a->count && a->time[i] <= b->time[b->count - 1]; i++) {
+    for (i = 0; i < a->count && a->time[i] <= b->time[b->count - 1]; i++) {
         const double value = a->values[i * (size_t)a->columns + (size_t)column];
         const double off = fabs(value - interpolate(b, column, a->time[i], &at));
         if (!(off <= worst)) worst = off; /* keeps what is not a number */
+        squares += off * off;
         low = fmin(low, value);
         high = fmax(high, value);
     }
+    if (rms && i && high > low) *rms = sqrt(squares / (double)i) / (high - low);
     return high > low ? worst / (high - low) : worst > 0 ? HUGE_VAL : 0;
 }
 

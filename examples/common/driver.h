@@ -89,8 +89,9 @@ int driver_table(driver *d, const char *file, const char *header, const driver_h
 typedef void (*driver_probe_fn)(void *user, double *row);
 tlsph_result driver_record(scene_body *body, double end, double interval, driver_probe_fn probe, void *user,
                            driver_history *history);
-/* Largest difference of a column of two histories over the time that both cover, by the range of a's; b is interpolated. */
-double driver_difference(const driver_history *a, const driver_history *b, int column);
+/* Largest difference of a column of two histories over the time that both cover, by the range of a's; b is interpolated.
+   *rms (or NULL): the root mean square of the differences instead. */
+double driver_difference(const driver_history *a, const driver_history *b, int column, double *rms);
 /* Draws panels of curves: panel i has title, axis label and the columns first[i] ... first[i + 1] - 1 with their names. */
 typedef struct driver_chart { const char *title, *y_label; int first, count; const char *names[4]; } driver_chart;
 int driver_plot(driver *d, const char *file, const driver_history *history, const driver_chart *charts, int count,
