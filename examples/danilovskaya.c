@@ -238,7 +238,8 @@ int main(int argc, char **argv) {
         { "dimension", EX_INT, &p.dimension, NULL, NULL, 2, 3, "2: plane strain" },
         { "material", EX_CHOICE, &material, NULL, "linear|mg", 0, 0, "mg: Mie-Grueneisen" },
         { "load", EX_REAL, &p.load, NULL, NULL, 1e-9, 0.1, "delta times the applied temperature over T0" },
-        { "rise", EX_REAL, &p.rise, "spacings", NULL, 0, 100, "first problem: the jump lasts a wave's time over so many" },
+        { "rise", EX_REAL, &p.rise, "spacings", NULL, 0, 100, "first problem: the jump lasts a wave's time over these" },
+        { "nsni", EX_REAL, &p.nsni, NULL, NULL, 0, 10, "factor f of the stabilised force instead of sharp gradients" },
         { "family", EX_INT, &family, NULL, NULL, 0, 1, "1: figures 13 to 17 too, in plane strain" } };
     danilovskaya_default(&p);
     p.options.end_time = 2;

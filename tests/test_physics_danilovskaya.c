@@ -136,6 +136,38 @@ TEST(bar_other_problems) {
     CHECK_BELOW(e.u, 0.02);
 }
 
+/* The naturally stabilised force is stiffness against dispersion: the larger f up to 4, the smaller error and overshoot.
+   Its energy is seen as work of a load, small and taken from the bar. */
+TEST(bar_stabilised_force) {
+    static const double factors[4] = { 0, 1, 3, 4 };
+    danilovskaya_errors last = { HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL };
+    double plain = 0;
+    DOUBLE_ONLY();
+    CHECK_CLOSE(danilovskaya_nsni_frequency(0), 1, 1e-12);
+    CHECK_CLOSE(danilovskaya_nsni_frequency(1), sqrt(1.5), 1e-12);
+    CHECK_CLOSE(danilovskaya_nsni_frequency(3), 2, 1e-12);
+    CHECK_CLOSE(danilovskaya_nsni_frequency(4), sqrt(16.0 / 3), 1e-12);
+    for (int i = 0; i < 4; i++) {
+        danilovskaya_parameters p = bar_parameters(DANILOVSKAYA_FIRST, 1, 0.1);
+        danilovskaya bar;
+        danilovskaya_errors e;
+        tlsph_ledger ledger;
+        p.options.sharp = 0;
+        p.nsni = factors[i];
+        REQUIRE_OK(danilovskaya_create(&p, &bar, NULL));
+        REQUIRE_OK(danilovskaya_advance(&bar, 1.5));
+        REQUIRE(danilovskaya_compare(&bar, &e) == 0);
+        tlsph_ledger_read(bar.body.solver, &ledger);
+        CHECK(e.theta < last.theta && e.u < last.u && e.overshoot < last.overshoot);
+        if (i == 0) plain = e.u;
+        else CHECK(ledger.external_work < 0 && fabs(ledger.external_work) < 0.05 * ledger.kinetic_energy);
+        last = e;
+        danilovskaya_destroy(&bar);
+    }
+    CHECK(plain > 1.4 * last.u);
+    REPORT("u falls %.2f times", plain / last.u);
+}
+
 /* A small load makes the nonlinear material linear. */
 TEST(bar_mie_gruneisen_agrees_with_linear) {
     danilovskaya_parameters linear = bar_parameters(DANILOVSKAYA_FIRST, 1, 0.1), nonlinear;
@@ -171,4 +203,5 @@ TEST(slow_bar_targets) {
 
 SUITE(physics_danilovskaya, ENTRY(uncoupled_closed_form), ENTRY(uncoupled_probe), ENTRY(equations_hold),
       ENTRY(boundary_and_front), ENTRY(nothing_before_heating), ENTRY(bar_first_problem_first_order),
-      ENTRY(bar_other_problems), ENTRY(bar_mie_gruneisen_agrees_with_linear), ENTRY(slow_bar_targets))
+      ENTRY(bar_other_problems), ENTRY(bar_stabilised_force),
+      ENTRY(bar_mie_gruneisen_agrees_with_linear), ENTRY(slow_bar_targets))

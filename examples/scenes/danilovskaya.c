@@ -92,6 +92,47 @@ static void heat_surface(scene_setup *setup, danilovskaya *out, double area) {
     if (flux) scene_share_area(setup, c, area);
 }
 
+/* The energy sum over inner sections f/(24 h) M A q^2, q = u_i-1 - 2 u_i + u_i+1, is that of the strain's gradient in
+   003 (34) with M_L = h^3/12; its force needs the positions only. u is odd across the roller at the far end, where q = 0;
+   at the free end the half cell has no second difference of its own. */
+static void stabilise(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
+                      const tlsph_real *x, tlsph_real *values) {
+    danilovskaya *bar = user;
+    double *u = bar->displacement, *q = u + bar->cells + 1;
+    const double h = bar->parameters.length * bar->length_unit / (double)bar->cells;
+    const double stiffness = bar->parameters.nsni * P_WAVE / (12 * h * h);
+    (void)time; (void)particle;
+    for (size_t a = 0; a < count; a++)
+        u[(size_t)((double)X[3 * a] / h + 0.5)] = (double)x[3 * a] - (double)X[3 * a]; /* equal across the bar */
+    for (size_t i = 1; i < bar->cells; i++) q[i] = u[i - 1] - 2 * u[i] + u[i + 1];
+    q[0] = q[bar->cells] = 0;
+    for (size_t a = 0; a < count; a++) {
+        const size_t i = (size_t)((double)X[3 * a] / h + 0.5);
+        const double before = i ? q[i - 1] : 0, after = i < bar->cells ? q[i + 1] : -q[i - 1];
+        const double share = i == 0 || i == bar->cells ? 2 : 1; /* the end sections hold half a cell */
+        values[3 * a] = (tlsph_real)(-stiffness * share * (before - 2 * q[i] + after));
+        values[3 * a + 1] = values[3 * a + 2] = 0;
+    }
+}
+/* Largest frequency, omega^2 h^2 = 4 z - (4 - 4f/3) z^2 over 0 <= z <= 1, against 1 of the plain stencil. */
+double danilovskaya_nsni_frequency(double f) {
+    const double middle = f < 1.5 ? 1 / (2 - 2 * f / 3) : 1;
+    return sqrt(4 * middle - (4 - 4 * f / 3) * middle * middle);
+}
+static tlsph_result add_stabilisation(scene_setup *setup, danilovskaya *out, scene_options *options) {
+    tlsph_condition *c;
+    if (!(out->parameters.nsni > 0)) return TLSPH_OK;
+    out->cells = (size_t)(out->parameters.length / out->parameters.spacing + 0.5);
+    out->displacement = calloc(2 * (out->cells + 1), sizeof *out->displacement);
+    if (!out->displacement) return TLSPH_ERROR_MEMORY;
+    c = scene_add(setup, TLSPH_BODY_FORCE);
+    c->values = stabilise;
+    c->values_user = out;
+    options->sharp = 0;
+    options->cfl /= danilovskaya_nsni_frequency(out->parameters.nsni);
+    return TLSPH_OK;
+}
+
 static int by_position(const void *a, const void *b) {
     const double *p = a, *q = b;
     return (p[0] > q[0]) - (p[0] < q[0]);
@@ -124,6 +165,7 @@ tlsph_result danilovskaya_create(const danilovskaya_parameters *p, danilovskaya 
     scene_setup setup;
     tlsph_material material;
     tlsph_result result;
+    scene_options options = p->options;
     double width, area = 1;
     memset(out, 0, sizeof *out);
     out->parameters = *p;
@@ -136,7 +178,8 @@ tlsph_result danilovskaya_create(const danilovskaya_parameters *p, danilovskaya 
     for (int i = 1; i < p->dimension; i++) scene_add_rollers(&setup, i); /* insulated: their `conducts` is 0 */
     scene_add_plane(&setup, TLSPH_ROLLER, 0, p->length * out->length_unit);
     heat_surface(&setup, out, area);
-    result = scene_end(&setup, &p->options, &out->body, error);
+    if (setup.result == TLSPH_OK) setup.result = add_stabilisation(&setup, out, &options);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = find_line(out);
     if (result != TLSPH_OK) danilovskaya_destroy(out);
     return result;
@@ -144,7 +187,9 @@ tlsph_result danilovskaya_create(const danilovskaya_parameters *p, danilovskaya 
 
 void danilovskaya_destroy(danilovskaya *bar) {
     free(bar->line);
+    free(bar->displacement);
     bar->line = NULL;
+    bar->displacement = NULL;
     scene_destroy(&bar->body);
 }
 

@@ -388,6 +388,8 @@ typedef struct danilovskaya_parameters {
     double rise;            /* first problem: the jump is spread over the time of a wave for so many spacings, with its
                                middle at t = 0; what is shorter than a spacing would only ring behind the front */
     int material;           /* TLSPH_LINEAR or TLSPH_MIE_GRUNEISEN */
+    double nsni;            /* f, factor of the naturally stabilised force (METHOD 9): 0 none, 1 as in 003, 3 compact
+                               stencil, 4 fourth order. In place of sharp gradients; as a load, so its energy is external */
 } danilovskaya_parameters;
 
 typedef struct danilovskaya {
@@ -397,6 +399,8 @@ typedef struct danilovskaya {
     double T0;              /* K */
     size_t sections;        /* particles along the bar */
     size_t *line;           /* their numbers on one edge, in order of y */
+    double *displacement;   /* of the sections, for nsni, and their second differences */
+    size_t cells;           /* along the bar */
     double start, ramp;     /* t at the solver's time 0; length of the rise of the temperature */
     double surface, surface_rate, surface_time; /* theta at y = 0 as the second problem's flux needs it */
 } danilovskaya;
@@ -414,6 +418,8 @@ danilovskaya_state danilovskaya_at(size_t count, const double *y, const danilovs
    front, as a share of the front's jump exp(-delta t/2) (0 where the problem has no jump). */
 typedef struct danilovskaya_errors { double theta, u, sigma, overshoot; } danilovskaya_errors;
 int danilovskaya_compare(const danilovskaya *bar, danilovskaya_errors *errors);
+/* Largest frequency of the stabilised stencil, in units of that without: the time step is so much shorter. */
+double danilovskaya_nsni_frequency(double f);
 void danilovskaya_destroy(danilovskaya *bar);
 
 /* ---- derivatives in one dimension: 002 section 4.1, figures 4 to 6 ------------------------------------------------ */
