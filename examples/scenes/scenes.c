@@ -129,6 +129,15 @@ void scene_begin(scene_setup *setup, const tlsph_fill *fill, const tlsph_materia
     setup->result = tlsph_cloud_create(fill, &setup->body.cloud, error);
 }
 
+void scene_begin_cloud(scene_setup *setup, const tlsph_cloud *cloud, tlsph_result made, const tlsph_material *material,
+                       tlsph_error *error) {
+    memset(setup, 0, sizeof *setup);
+    if (error) memset(error, 0, sizeof *error);
+    setup->body.material = *material;
+    setup->body.cloud = *cloud;
+    setup->result = made;
+}
+
 /* A failure of this file's own, which no function of the library has described. */
 static void describe(tlsph_error *error, tlsph_result result) {
     if (!error || error->result != TLSPH_OK) return;

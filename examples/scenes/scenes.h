@@ -64,6 +64,9 @@ typedef struct scene_setup {
 } scene_setup;
 
 void scene_begin(scene_setup *setup, const tlsph_fill *fill, const tlsph_material *material, tlsph_error *error);
+/* The same for a cloud of one's own, which the setup then owns; `made`: the result of making it. */
+void scene_begin_cloud(scene_setup *setup, const tlsph_cloud *cloud, tlsph_result made, const tlsph_material *material,
+                       tlsph_error *error);
 /* A condition on all particles; the pointer is never NULL and lives until scene_end. */
 tlsph_condition *scene_add(scene_setup *setup, tlsph_condition_kind kind);
 /* On the particles with X[axis] = value, with the normal along the axis. */
@@ -707,5 +710,56 @@ typedef struct spherical_ball {
 
 void spherical_ball_default(spherical_ball_parameters *parameters);
 tlsph_result spherical_ball_create(const spherical_ball_parameters *parameters, spherical_ball *out, tlsph_error *error);
+
+/* ---- Taylor bar: 001 section 7.2.3, table 2 ---------------------------------------------------------------------- */
+
+/* A quarter (x, z >= 0) of a round bar along Y that starts at Y = 0, `n` spacings a radius, with particles on the curved
+   surface; for TLSPH_GIVEN. The polygon of the arc's particles has the area of the disc. */
+tlsph_result scene_round_bar(double radius, double length, int n, tlsph_cloud *out);
+
+typedef struct taylor_bar_parameters {
+    scene_options options;
+    int n;                /* spacings a radius */
+    int fill;             /* 0: round, particles on the surface; 1: lattice */
+    int wall;             /* 0: contact; 1: foot held on the wall (roller) */
+    double radius, length; /* m */
+    double speed;         /* m/s, towards -Y */
+    tlsph_material material;
+} taylor_bar_parameters;
+
+typedef struct taylor_bar {
+    scene_body body;
+    taylor_bar_parameters parameters;
+    uint32_t *foot;       /* quadrilaterals of the foot, 4 particles each */
+    size_t faces;
+    size_t tip;           /* particle on the axis at the other end */
+} taylor_bar;
+
+typedef struct taylor_bar_shape {
+    double radius;        /* m, of the disc that has the area of the foot now */
+    double length;        /* m, on the axis */
+    double plastic_strain; /* largest */
+    double lift;          /* m, largest height of the foot above the wall */
+} taylor_bar_shape;
+
+void taylor_bar_default(taylor_bar_parameters *parameters);
+tlsph_result taylor_bar_create(const taylor_bar_parameters *parameters, taylor_bar *out, tlsph_error *error);
+void taylor_bar_read(const taylor_bar *bar, taylor_bar_shape *shape);
+void taylor_bar_destroy(taylor_bar *bar);
+
+/* ---- block with holes, pulled or punched: 001 sections 7.2.1, 7.2.2 ---------------------------------------------- */
+
+typedef struct perforated_block_parameters {
+    scene_options options;
+    int punch;            /* 0: pulled, clamped below; 1: punched between rollers */
+    int n;                /* spacings in 0.1 m */
+    double nu, speed;     /* -, m/s */
+} perforated_block_parameters;
+
+typedef struct perforated_block { scene_body body; perforated_block_parameters parameters; } perforated_block;
+
+void perforated_block_default(perforated_block_parameters *parameters, int punch);
+tlsph_result perforated_block_create(const perforated_block_parameters *parameters, perforated_block *out,
+                                     tlsph_error *error);
 
 #endif
