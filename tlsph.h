@@ -4004,7 +4004,8 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
 /* Heat of one pair. The double-gradient flux of (54e), (57), whose production is Q.grad theta/theta^2 exactly, and in
    the compact form the difference between the two-point flux k (theta_b - theta_a) and its value from the gradients. On an
    undeformed lattice the sum is the two-point flux, under shear the mixed terms of K stay; the limiter is that of the
-   dissipation, so heat of this part only flows down the pair's temperature difference. k = h/J |c|^2 / (C.d). */
+   dissipation, so heat of this part only flows down the pair's temperature difference. k = h/J |c|^2/|C|^2 (C.d)/|d|^2,
+   on lattices h/J |c|^2/(C.d), which is unbounded in clouds, where C may be nearly perpendicular to d. */
 TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g, const tlsph_real *C,
                                     const tlsph_real *rest, const int dim, const int thermal, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, dd = D * D;
@@ -4027,7 +4028,8 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, c
     if (!(Cd > 0)) return;
     tlsphi_multiply(dim, s->A + dd * a, g, c_a);
     tlsphi_multiply(dim, s->A + dd * b, g, c_b);
-    const tlsph_real k = (s->h_J[a] * tlsphi_dot(dim, c_a, c_a) + s->h_J[b] * tlsphi_dot(dim, c_b, c_b)) / (2 * Cd);
+    const tlsph_real k = (s->h_J[a] * tlsphi_dot(dim, c_a, c_a) + s->h_J[b] * tlsphi_dot(dim, c_b, c_b)) * Cd /
+                         (2 * tlsphi_dot(dim, C, C) * tlsphi_dot(dim, d, d));
     const tlsph_real into = k * jump;
     sum->heat += thermal == TLSPH_ENERGY ? into : into / theta_a;
     sum->conduction += into * D_theta / (2 * theta_a * theta_b);

@@ -31,7 +31,8 @@ static int run_spot(run *r, const conduction_parameters *p, int finest, double *
     if (conduction_create(p, &body, &failure) != TLSPH_OK) return driver_error(&failure);
     if (finest && p->motion == CONDUCTION_RESTING) keep_shot(&r->shots[0], &body, "start, resting");
     if (shown && driver_begin(&r->base, "conduction", &p->options, &body.body, p->options.end_time)) return 1;
-    result = shown ? driver_run_to(&r->base, p->options.end_time) : tlsph_advance(body.body.solver, (tlsph_real)p->options.end_time);
+    result = shown ? driver_run_to(&r->base, p->options.end_time)
+                   : tlsph_advance(body.body.solver, (tlsph_real)p->options.end_time);
     *error = conduction_error(&body);
     if (finest) keep_shot(&r->shots[1 + (int)p->motion], &body, motions[p->motion]);
     if (shown) code = driver_end(&r->base);
@@ -67,7 +68,10 @@ static void draw_spots(run *r, const conduction_parameters *p) {
     ex_view view;
     memset(&view, 0, sizeof view);
     view.panel_width = 420; view.panel_height = 420;
-    view.camera.azimuth = -90; view.camera.elevation = p->dimension == 2 ? 90 : 40; view.camera.up_axis = 2; view.camera.zoom = 1;
+    view.camera.azimuth = -90;
+    view.camera.elevation = p->dimension == 2 ? 90 : 40;
+    view.camera.up_axis = 2;
+    view.camera.zoom = 1;
     view.map = EX_MAP_HEAT;
     view.low = (double)p->material.reference_temperature; view.high = view.low + 0.7 * p->amplitude;
     view.label = "temperature [K]";
@@ -97,7 +101,8 @@ static int run_decay(const conduction_parameters *p, double end, double *share) 
 }
 
 static int run_decays(run *r, const conduction_parameters *base) {
-    const double D = (double)base->material.conductivity / (double)(base->material.density * base->material.specific_heat);
+    const double D =
+        (double)base->material.conductivity / (double)(base->material.density * base->material.specific_heat);
     const double fast = 4 * base->dimension * D * 16 * 16, slow = SCENE_PI * SCENE_PI * base->dimension * D;
     double time[2][SAMPLES + 1], share[3][SAMPLES + 1], exact[2][SAMPLES + 1];
     conduction_parameters p = *base;
@@ -123,12 +128,14 @@ static int run_decays(run *r, const conduction_parameters *base) {
         const ex_curve odd[3] = { { "compact", time[0], share[0], SAMPLES + 1, 0, 0 },
                                   { "double gradient (56)", time[0], share[1], SAMPLES + 1, 0, 1 },
                                   { "two-point flux, exact", time[0], exact[0], SAMPLES + 1, 1, 2 } };
-        const ex_curve mode[2] = { { "computed", time[1], share[2], SAMPLES + 1, 0, 0 }, { "exact", time[1], exact[1], SAMPLES + 1, 1, 1 } };
+        const ex_curve mode[2] = { { "computed", time[1], share[2], SAMPLES + 1, 0, 0 },
+                                   { "exact", time[1], exact[1], SAMPLES + 1, 1, 1 } };
         const ex_curve *of[2] = { odd, mode };
         const int counts[2] = { 3, 2 };
         ex_axes axes[2];
         memset(axes, 0, sizeof axes);
-        axes[0].title = "temperatures that alternate, 16 spacings: share left"; axes[1].title = "cosine mode, 32 spacings: share left";
+        axes[0].title = "temperatures that alternate, 16 spacings: share left";
+        axes[1].title = "cosine mode, 32 spacings: share left";
         for (int i = 0; i < 2; i++) { axes[i].x_label = "t [s]"; axes[i].y_label = "[1]"; }
         ex_plot_grid(driver_path(&r->base, "decay.png"), 640, 420, axes, of, counts, 2, 2);
     }
@@ -146,16 +153,20 @@ int main(int argc, char **argv) {
     static run r;
     conduction_parameters p;
     int code;
-    const ex_option own[] = {
-        { "n", EX_INT, &p.n, NULL, NULL, 16, 1024, "spacings a side of the finest body; two more have n/2 and n/4" },
-        { "dimension", EX_INT, &p.dimension, NULL, NULL, 2, 3, "2: plane strain" },
-        { "amplitude", EX_REAL, &p.amplitude, "K", NULL, 1e-6, 250, "of the spot" },
-        { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45, "moves inner particles (then --support 0.9 or an operator for clouds)" } };
+    const ex_option own[] = { { "n", EX_INT, &p.n, NULL, NULL, 16, 1024,
+                                "spacings a side of the finest body; two more have n/2 and n/4" },
+                              { "dimension", EX_INT, &p.dimension, NULL, NULL, 2, 3, "2: plane strain" },
+                              { "amplitude", EX_REAL, &p.amplitude, "K", NULL, 1e-6, 250, "of the spot" },
+                              { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45,
+                                "moves inner particles; then the closed operator stands in for corrected kernels" } };
     conduction_default(&p);
     p.n = 96;
-    driver_arguments(argc, argv, "conduction", "conduction alone: spots and decays against exact solutions", &p.options, own,
-                     (int)(sizeof own / sizeof *own));
-    if (p.options.thermal == TLSPH_ISOTHERMAL) { fprintf(stderr, "error: --thermal must be energy or entropy here\n"); return 2; }
+    driver_arguments(argc, argv, "conduction", "conduction alone: spots and decays against exact solutions", &p.options,
+                     own, (int)(sizeof own / sizeof *own));
+    if (p.options.thermal == TLSPH_ISOTHERMAL) {
+        fprintf(stderr, "error: --thermal must be energy or entropy here\n");
+        return 2;
+    }
     p.omega = SCENE_PI / 3 / p.options.end_time;
     code = run_spots(&r, &p);
     if (!code) { draw_spots(&r, &p); code = run_decays(&r, &p); }

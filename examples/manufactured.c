@@ -1,12 +1,12 @@
 /*
 manufactured.c - convergence against a manufactured solution: 000 section 7.1, figure 3
 
-Two settings: the paper's (strain 5e-4, 0.001 s, in which waves travel 8 mm: little more than one gradient is tested), and a
-demanding one (strain 0.12, waves cross the cube twice), both with exact sources at finite strain. Orders are least-squares
-slopes of the relative L2 errors of all components together, at the end (paper) or over five instants (demanding).
-The exact motion drives the outer two of three layers outside the faces. What fewer do: --layers 0 --driven 1 (gradients at
-the faces one-sided: stress of order 1.5), --layers 1 --driven 2 (a kink of the error at the faces: 1.6 in the paper's setting).
-With --unknowns pFHJ take --layers 4: the dissipation of J disturbs one layer more.
+Two settings: the paper's (strain 5e-4, 0.001 s, in which waves travel 8 mm: little more than one gradient is tested),
+and a demanding one (strain 0.12, waves cross the cube twice), both with exact sources at finite strain. Orders are
+least-squares slopes of the relative L2 errors of all components together, at the end (paper) or over five instants
+(demanding). The exact motion drives the outer two of three layers outside the faces. What fewer do: --layers 0 --driven
+1 (gradients at the faces one-sided: stress of order 1.5), --layers 1 --driven 2 (a kink of the error at the faces: 1.6
+in the paper's setting). With --unknowns pFHJ take --layers 4: the dissipation of J disturbs one layer more.
 */
 #include "common/driver.h"
 
@@ -69,7 +69,7 @@ static int run_level(driver *d, const manufactured_parameters *p, int instants, 
     return code == 3 ? 3 : 0;
 }
 
-/* Finest level n. Coarser than 8 spacings, the demanding motion trips the scheme's detection of fronts at its corners. */
+/* Finest level n. Coarser than 8 spacings, the demanding motion looks like a front at the cube's corners. */
 static int run_study(driver *d, const manufactured_parameters *base, int n, int demanding, study *s) {
     static const double share[2][LEVELS] = { { 0.375, 0.5, 0.75, 1 }, { 0.5, 0.625, 0.75, 1 } };
     double p[LEVELS], P[LEVELS], theta[LEVELS];
@@ -93,7 +93,8 @@ static int run_study(driver *d, const manufactured_parameters *base, int n, int 
 
 /* Panels of p, P and theta over the spacing as figure 3, with lines of slope 2. */
 static void draw_study(driver *d, const char *file, const study *s) {
-    static const char *const p_names[] = { "all", "p_x", "p_y", "p_z" }, *const P_names[] = { "all", "P_xX", "P_xY", "P_yX", "P_zZ" };
+    static const char *const p_names[] = { "all", "p_x", "p_y", "p_z" }, *const P_names[] = { "all", "P_xX", "P_xY",
+                                                                                              "P_yX", "P_zZ" };
     static const int P_index[] = { 0, 0, 1, 3, 8 };
     double values[3][6][LEVELS];
     ex_curve curves[3][6];
@@ -103,17 +104,27 @@ static void draw_study(driver *d, const char *file, const study *s) {
     memset(axes, 0, sizeof axes);
     memset(curves, 0, sizeof curves);
     for (int panel = 0; panel < 3; panel++) {
-        static const char *const titles[3] = { "linear momentum", "first Piola-Kirchhoff stress", "temperature - theta_R" };
+        static const char *const titles[3] = { "linear momentum", "first Piola-Kirchhoff stress",
+                                               "temperature - theta_R" };
         const int last = counts[panel] - 1;
         axes[panel].title = titles[panel];
         axes[panel].x_label = "spacing [m]"; axes[panel].y_label = "relative L2 error";
         axes[panel].log_x = axes[panel].log_y = 1;
         for (int c = 0; c <= last; c++) {
-            const ex_curve curve = { c == last ? "slope 2" : panel == 0 ? p_names[c] : panel == 1 ? P_names[c] : "theta", s->h,
-                                     values[panel][c], LEVELS, c == last ? 1 : 3, c };
+            const ex_curve curve = { c == last    ? "slope 2"
+                                     : panel == 0 ? p_names[c]
+                                     : panel == 1 ? P_names[c]
+                                                  : "theta",
+                                     s->h,
+                                     values[panel][c],
+                                     LEVELS,
+                                     c == last ? 1 : 3,
+                                     c };
             for (int i = 0; i < LEVELS; i++) {
                 const manufactured_errors *e = &s->errors[i];
-                double value = panel == 0 ? (c ? e->p_each[c - 1] : e->p) : panel == 1 ? (c ? e->P_each[P_index[c]] : e->P) : e->theta;
+                double value = panel == 0   ? (c ? e->p_each[c - 1] : e->p)
+                               : panel == 1 ? (c ? e->P_each[P_index[c]] : e->P)
+                                            : e->theta;
                 if (c == last) value = 0.5 * values[panel][0][0] * pow(s->h[i] / s->h[0], 2);
                 values[panel][c][i] = value;
             }
@@ -140,7 +151,8 @@ static void report(const char *prefix, const study *s, double least, int checked
 }
 
 /* One material and form in one setting. */
-static int run_case(driver *d, const manufactured_parameters *base, int kind, int demanding, int checked, double end_time) {
+static int run_case(driver *d, const manufactured_parameters *base, int kind, int demanding, int checked,
+                    double end_time) {
     static const char *const materials[3] = { "linear", "mee", "mg" };
     manufactured_parameters p = *base;
     char prefix[64], file[96];
@@ -164,23 +176,29 @@ int main(int argc, char **argv) {
     manufactured_parameters p;
     driver d;
     int material = 2, setting = 0, all = 0, code = 0;
-    const ex_option own[] = {
-        { "n", EX_INT, &p.n, NULL, NULL, 8, 128, "spacings a side of the finest demanding level; the paper's has twice as many" },
-        { "material", EX_CHOICE, &material, NULL, "linear|mee|mg", 0, 0, "of the demanding setting (the paper's is linear)" },
-        { "setting", EX_CHOICE, &setting, NULL, "both|paper|demanding", 0, 0, "which study" },
-        { "all", EX_FLAG, &all, NULL, NULL, 0, 0, "all materials and both thermal forms" },
-        { "centred", EX_INT, &p.centred, NULL, NULL, 0, 1, "1: particles at cell centres" },
-        { "layers", EX_INT, &p.layers, NULL, NULL, 0, 8, "of particles outside the faces" },
-        { "driven", EX_INT, &p.driven, NULL, NULL, 1, 9, "outermost layers that move exactly" },
-        { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45, "moves inner particles (then --support 0.9 or an operator for clouds)" } };
+    const ex_option own[] = { { "n", EX_INT, &p.n, NULL, NULL, 8, 128,
+                                "spacings a side of the finest demanding level; the paper's has twice as many" },
+                              { "material", EX_CHOICE, &material, NULL, "linear|mee|mg", 0, 0,
+                                "of the demanding setting (the paper's is linear)" },
+                              { "setting", EX_CHOICE, &setting, NULL, "both|paper|demanding", 0, 0, "which study" },
+                              { "all", EX_FLAG, &all, NULL, NULL, 0, 0, "all materials and both thermal forms" },
+                              { "centred", EX_INT, &p.centred, NULL, NULL, 0, 1, "1: particles at cell centres" },
+                              { "layers", EX_INT, &p.layers, NULL, NULL, 0, 8, "of particles outside the faces" },
+                              { "driven", EX_INT, &p.driven, NULL, NULL, 1, 9, "outermost layers that move exactly" },
+                              { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45,
+                                "moves inner particles; then the closed operator stands in for corrected kernels" } };
     manufactured_default(&p);
     p.options.end_time = 0.25;
-    driver_arguments(argc, argv, "manufactured", "convergence in a manufactured thermo-elastic problem (000 section 7.1)",
-                     &p.options, own, (int)(sizeof own / sizeof *own));
+    driver_arguments(argc, argv, "manufactured",
+                     "convergence in a manufactured thermo-elastic problem (000 section 7.1)", &p.options, own,
+                     (int)(sizeof own / sizeof *own));
     memset(&d, 0, sizeof d);
     snprintf(d.folder, sizeof d.folder, "%s", p.options.output[0] ? p.options.output : "out/manufactured");
     if (ex_make_directory(d.folder)) { fprintf(stderr, "error: cannot write to %s\n", d.folder); return 1; }
-    if (p.options.thermal == TLSPH_ISOTHERMAL) { fprintf(stderr, "error: --thermal must be energy or entropy here\n"); return 2; }
+    if (p.options.thermal == TLSPH_ISOTHERMAL) {
+        fprintf(stderr, "error: --thermal must be energy or entropy here\n");
+        return 2;
+    }
     for (int i = 0; i < 12 && !code; i++) {
         const int kind = i % 3, demanding = i >= 6;
         const int thermal = i / 3 % 2 ? TLSPH_ENTROPY : TLSPH_ENERGY;

@@ -1,10 +1,10 @@
 /*
 shock_tube.c - two halves of a bar run into each other: the state between the shocks against the jump conditions
 
-Uniaxial strain, material of 000 section 7.1, no conduction. The exact star state follows from mass, momentum and energy alone
-(scenes/impact.c). Means are read where the plateau is clean, from 0.4 to 0.8 of the shock's path: beside X = 0 the start, in
-which the shock is not yet as wide as the scheme makes it, leaves heat behind (at X = 0 some tens of percent of the warming,
-falling as 1/X); near the shock is its tail.
+Uniaxial strain, material of 000 section 7.1, no conduction. The exact star state follows from mass, momentum and energy
+alone (scenes/impact.c). Means are read where the plateau is clean, from 0.4 to 0.8 of the shock's path: beside X = 0
+the start, in which the shock is not yet as wide as the scheme makes it, leaves heat behind (at X = 0 some tens of
+percent of the warming, falling as 1/X); near the shock is its tail.
 */
 #include "common/driver.h"
 
@@ -35,7 +35,8 @@ static void profile_free(profile *p) {
 
 /* The cloud of a box is numbered with X fastest, so that the edge comes in order. 0 on success. */
 static int profile_read(const run *r, profile *p) {
-    static const tlsph_field fields[COLUMNS] = { TLSPH_FIELD_STRESS, TLSPH_FIELD_J, TLSPH_FIELD_TEMPERATURE, TLSPH_FIELD_VELOCITY };
+    static const tlsph_field fields[COLUMNS] = { TLSPH_FIELD_STRESS, TLSPH_FIELD_J, TLSPH_FIELD_TEMPERATURE,
+                                                 TLSPH_FIELD_VELOCITY };
     const tlsph_particles *particles = &r->bar.body.cloud.particles;
     const double t = r->base.now.time, close = 1e-3 * r->bar.parameters.length / r->bar.parameters.n;
     double *read[COLUMNS];
@@ -77,7 +78,8 @@ static void draw_profile(run *r) {
     memset(axes, 0, sizeof axes);
     if (profile_read(r, &p)) { profile_free(&p); return; }
     for (int i = 0; i < COLUMNS; i++) {
-        const ex_curve computed = { "computed", p.X, p.is[i], p.count, 0, 0 }, exact = { "exact", p.X, p.should[i], p.count, 1, 1 };
+        const ex_curve computed = { "computed", p.X, p.is[i], p.count, 0, 0 },
+                       exact = { "exact", p.X, p.should[i], p.count, 1, 1 };
         curves[i][0] = computed; curves[i][1] = exact;
         axes[i].title = titles[i]; axes[i].x_label = "X [m]"; axes[i].y_label = units[i];
         of[i] = curves[i];
@@ -141,7 +143,8 @@ static int run_bar(const impact_parameters *p) {
     r.shock = impact_exact(&q, &r.exact);
     if (!(q.options.end_time > 0)) q.options.end_time = 0.34 * q.length / r.shock; /* the free ends are still unaware */
     if (q.options.end_time * r.shock > 0.5 * q.length) {
-        fprintf(stderr, "error: --end-time must be at most %g s, when the shocks reach the ends\n", 0.5 * q.length / r.shock);
+        fprintf(stderr, "error: --end-time must be at most %g s, when the shocks reach the ends\n",
+                0.5 * q.length / r.shock);
         return 2;
     }
     if (impact_create(&q, &r.bar, &error) != TLSPH_OK) return driver_error(&error);
@@ -170,7 +173,8 @@ int main(int argc, char **argv) {
     p.options.end_time = 0;
     driver_arguments(argc, argv, "shock_tube", "symmetric impact of two halves of a bar, against the jump conditions",
                      &p.options, own, (int)(sizeof own / sizeof *own));
-    if (p.options.thermal != TLSPH_ENERGY) fprintf(stderr, "note: only --thermal energy conserves what a shock conserves\n");
+    if (p.options.thermal != TLSPH_ENERGY)
+        fprintf(stderr, "note: only --thermal energy conserves what a shock conserves\n");
     if (p.options.thermal == TLSPH_ISOTHERMAL) return 2;
     p.material = scene_paper_material(material ? TLSPH_MEE : TLSPH_MIE_GRUNEISEN);
     p.material.conductivity = 0;

@@ -14,7 +14,8 @@ TEST(jump_conditions_give_the_table) {
         double speed;
         impact_default(&p);
         p.material = table_material(&t, row, "frac");
-        p.material.expansion = R(table_number(&t, row, "cv") * table_number(&t, row, "G0") / (3 * 50050 / (3 * (1 - 0.6))));
+        p.material.expansion =
+            R(table_number(&t, row, "cv") * table_number(&t, row, "G0") / (3 * 50050 / (3 * (1 - 0.6))));
         p.speed = table_number(&t, row, "vL");
         speed = impact_exact(&p, &star);
         CHECK_CLOSE(star.stress, table_number(&t, row, "P_star"), 1e-12 * fabs(star.stress));

@@ -5,7 +5,11 @@ static manufactured_parameters row_parameters(const table *t, size_t row) {
     const char *model = table_word(t, row, "model");
     manufactured_parameters p;
     manufactured_default(&p);
-    manufactured_set(&p, strcmp(model, "LIN") == 0 ? TLSPH_LINEAR : strcmp(model, "MEE") == 0 ? TLSPH_MEE : TLSPH_MIE_GRUNEISEN, 0);
+    manufactured_set(&p,
+                     strcmp(model, "LIN") == 0   ? TLSPH_LINEAR
+                     : strcmp(model, "MEE") == 0 ? TLSPH_MEE
+                                                 : TLSPH_MIE_GRUNEISEN,
+                     0);
     p.rate = table_number(t, row, "A");
     p.heating = table_number(t, row, "B");
     p.material.gruneisen_exponent = R(table_number(t, row, "q"));
@@ -26,10 +30,11 @@ TEST(formulas_are_those_of_the_table) {
         double expected[9];
         manufactured_exact(&p, X, table_number(&t, row, "t"), &exact);
         {
-            const double values[] = { exact.theta, exact.entropy, exact.energy, exact.source, exact.force[0], exact.force[1],
-                                      exact.force[2], exact.x[0], exact.v[0] };
+            const double values[] = { exact.theta,    exact.entropy,  exact.energy, exact.source, exact.force[0],
+                                      exact.force[1], exact.force[2], exact.x[0],   exact.v[0] };
             for (int i = 0; i < 9; i++)
-                CHECK_CLOSE(values[i], table_number(&t, row, scalars[i]), fmax(1e-12, 1e2 * EPSILON) * (1e4 + fabs(values[i])));
+                CHECK_CLOSE(values[i], table_number(&t, row, scalars[i]),
+                            fmax(1e-12, 1e2 * EPSILON) * (1e4 + fabs(values[i])));
         }
         table_tensor(&t, row, "P", "", expected);
         for (int i = 0; i < 9; i++) CHECK_CLOSE(exact.P[i], expected[i], fmax(1e-12, 1e2 * EPSILON) * 1e5);
@@ -71,8 +76,8 @@ static orders measure(const manufactured_parameters *base, const int *n, int cou
     return out;
 }
 
-static void second_order(tlsph_material_kind kind, int demanding, tlsph_thermal thermal, int unknowns, const int *n, int count,
-                         double least) {
+static void second_order(tlsph_material_kind kind, int demanding, tlsph_thermal thermal, int unknowns, const int *n,
+                         int count, double least) {
     manufactured_parameters p;
     orders o;
     manufactured_default(&p);
@@ -89,11 +94,21 @@ static void second_order(tlsph_material_kind kind, int demanding, tlsph_thermal 
 
 static const int paper_n[3] = { 8, 12, 16 }, large_n[3] = { 8, 10, 12 }, fine_n[3] = { 8, 12, 16 };
 
-TEST(second_order_linear_as_in_the_paper) { DOUBLE_ONLY(); second_order(TLSPH_LINEAR, 0, TLSPH_ENERGY, TLSPH_PF, paper_n, 3, 1.9); }
-TEST(second_order_mee_as_in_the_paper) { DOUBLE_ONLY(); second_order(TLSPH_MEE, 0, TLSPH_ENTROPY, TLSPH_PF, paper_n, 3, 1.9); }
-TEST(second_order_mg_as_in_the_paper) { DOUBLE_ONLY(); second_order(TLSPH_MIE_GRUNEISEN, 0, TLSPH_ENERGY, TLSPH_PF, paper_n, 3, 1.9); }
+TEST(second_order_linear_as_in_the_paper) {
+    DOUBLE_ONLY();
+    second_order(TLSPH_LINEAR, 0, TLSPH_ENERGY, TLSPH_PF, paper_n, 3, 1.9);
+}
+TEST(second_order_mee_as_in_the_paper) {
+    DOUBLE_ONLY();
+    second_order(TLSPH_MEE, 0, TLSPH_ENTROPY, TLSPH_PF, paper_n, 3, 1.9);
+}
+TEST(second_order_mg_as_in_the_paper) {
+    DOUBLE_ONLY();
+    second_order(TLSPH_MIE_GRUNEISEN, 0, TLSPH_ENERGY, TLSPH_PF, paper_n, 3, 1.9);
+}
 
-/* What (000-13) means for the linear material: H = I and J = 1. With h/J the temperature stays 1.4 % off at every spacing. */
+/* What (000-13) means for the linear material: H = I and J = 1. With h/J the temperature stays 1.4 % off at every
+ * spacing. */
 TEST(linear_conduction_does_not_see_the_strain) {
     static const int n[2] = { 8, 10 };
     manufactured_parameters p;

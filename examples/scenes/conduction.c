@@ -1,13 +1,13 @@
 /*
 conduction.c - heat conduction alone, in a body at rest, held in a stretched and sheared state, or turned
 
-Without expansion nothing couples heat to motion, and Q = -h/J H^T H grad theta (000-13) is Fourier's law with the constant
-conductivity K = h/J H^T H in the reference: the isotropic h again in a rigid rotation, anisotropic in the stretched body.
-c_v d theta/dt = DIV (K grad theta) then has the exact solutions
-  spot  A sqrt(det S_0/det S) exp(-X.S^-1 X/2), S = S_0 + 2 t K/c_v, S_0 = sigma^2 I, as long as it is far from the surface;
-  mode  A prod_i cos(pi (X_i + 1/2)) e^{-st}, s = pi^2 sum_i K_ii/c_v, in the body that is not sheared: its faces are insulated.
-The alternating state +-A from particle to particle is no solution of the equation, but what a scheme may keep: the double
-gradient (56) does not see it; the compact flux makes it fall with 4 K/(c_v h^2) for each axis.
+Without expansion nothing couples heat to motion, and Q = -h/J H^T H grad theta (000-13) is Fourier's law with the
+constant conductivity K = h/J H^T H in the reference: the isotropic h again in a rigid rotation, anisotropic in the
+stretched body. c_v d theta/dt = DIV (K grad theta) then has the exact solutions spot  A sqrt(det S_0/det S) exp(-X.S^-1
+X/2), S = S_0 + 2 t K/c_v, S_0 = sigma^2 I, as long as it is far from the surface; mode  A prod_i cos(pi (X_i + 1/2))
+e^{-st}, s = pi^2 sum_i K_ii/c_v, in the body that is not sheared: its faces are insulated. The alternating state +-A
+from particle to particle is no solution of the equation, but what a scheme may keep: the double gradient (56) does not
+see it; the compact flux makes it fall with 4 K/(c_v h^2) for each axis.
 */
 #include "scenes.h"
 
@@ -33,7 +33,8 @@ void conduction_default(conduction_parameters *p) {
 
 static const double *held_gradient(const conduction_parameters *p) {
     static const double rest[9] = { 1, 0, 0, 0, 1, 0, 0, 0, 1 };
-    static const double plane[9] = { 1.3, 0.4, 0, -0.2, 0.9, 0, 0, 0, 1 }, space[9] = { 1.3, 0.4, 0.1, -0.2, 0.9, 0.15, 0.1, -0.1, 1.1 };
+    static const double plane[9] = { 1.3, 0.4, 0, -0.2, 0.9, 0, 0, 0, 1 },
+                        space[9] = { 1.3, 0.4, 0.1, -0.2, 0.9, 0.15, 0.1, -0.1, 1.1 };
     static const double diagonal[9] = { 1.3, 0, 0, 0, 0.8, 0, 0, 0, 1 };
     if (p->motion != CONDUCTION_STRETCHED) return rest;
     if (p->state == CONDUCTION_MODE) return diagonal;
@@ -94,7 +95,8 @@ double conduction_exact(const conduction_parameters *p, const tlsph_real X[3], d
 /* The rotation turns about the centre in the plane of the first two axes. */
 static void turning_velocity(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
                              const tlsph_real *x, tlsph_real *values) {
-    const double w = ((const conducting_body *)user)->parameters.omega, c = w * cos(w * (double)time), s = w * sin(w * (double)time);
+    const double w = ((const conducting_body *)user)->parameters.omega, c = w * cos(w * (double)time),
+                 s = w * sin(w * (double)time);
     (void)particle; (void)x;
     for (size_t i = 0; i < count; i++) {
         values[3 * i] = (tlsph_real)(-s * (double)X[3 * i] - c * (double)X[3 * i + 1]);
@@ -119,6 +121,7 @@ static void initial_state(const void *scene, const tlsph_real X[3], scene_state 
 
 tlsph_result conduction_create(const conduction_parameters *p, conducting_body *out, tlsph_error *error) {
     tlsph_fill fill = tlsph_fill_default(p->dimension);
+    scene_options options = p->options;
     scene_setup setup;
     tlsph_result result;
     memset(out, 0, sizeof *out);
@@ -126,6 +129,7 @@ tlsph_result conduction_create(const conduction_parameters *p, conducting_body *
     for (int i = 0; i < p->dimension; i++) { fill.origin[i] = (tlsph_real)-0.5; fill.size[i] = 1; }
     fill.spacing = (tlsph_real)(1.0 / p->n);
     fill.jitter = (tlsph_real)p->jitter;
+    if (p->jitter > 0) scene_options_cloud(&options, &fill);
     scene_begin(&setup, &fill, &p->material, error);
     if (p->motion == CONDUCTION_STRETCHED) scene_add(&setup, TLSPH_CLAMPED); /* all particles */
     if (p->motion == CONDUCTION_TURNING) {
@@ -133,7 +137,7 @@ tlsph_result conduction_create(const conduction_parameters *p, conducting_body *
         turn->values = turning_velocity;
         turn->values_user = out;
     }
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, initial_state);
     if (result != TLSPH_OK) scene_destroy(&out->body);
     return result;
@@ -141,11 +145,13 @@ tlsph_result conduction_create(const conduction_parameters *p, conducting_body *
 
 double conduction_error(const conducting_body *body) {
     const tlsph_particles *particles = &body->body.cloud.particles;
-    const double t = (double)tlsph_time(body->body.solver), theta_R = (double)body->parameters.material.reference_temperature;
+    const double t = (double)tlsph_time(body->body.solver),
+                 theta_R = (double)body->parameters.material.reference_temperature;
     tlsph_real *theta = scene_read(body->body.solver, TLSPH_FIELD_TEMPERATURE);
     double error = 0, scale = 0;
     for (size_t a = 0; theta && a < particles->count; a++) {
-        const double V = (double)particles->volumes[a], exact = conduction_exact(&body->parameters, particles->positions + 3 * a, t);
+        const double V = (double)particles->volumes[a],
+                     exact = conduction_exact(&body->parameters, particles->positions + 3 * a, t);
         error += V * pow((double)theta[a] - exact, 2);
         scale += V * pow(exact - theta_R, 2);
     }

@@ -1,15 +1,16 @@
 /*
-manufactured.c - a cube that is deformed and heated as prescribed, by exact body forces and heat sources: 000 section 7.1
+manufactured.c - a cube that is deformed and heated as prescribed, by exact body forces and heat sources: 000
+section 7.1
 
   x = X + s/2 |X|^2 1,  s = 2 A t,  1 = (1, 1, 1);   theta = theta_R (1 + B sin(pi X_1) (t + 1 s));   L = 1 m   (000-84)
 With g = s X.1 this gives
   F = I + s 1 (x) X,  J = 1 + g,  H = J I - s X (x) 1,  DIV F = 3 s 1,  DIV H = 0,
   N = H^T H = J^2 I - s J (X (x) 1 + 1 (x) X) + s^2 |X|^2 1 (x) 1,  DIV N = -s (J + 1) 1 - 3 s^2 X,
   F:F = 3 + 2 g + 3 s^2 |X|^2,  H:H = tr N.
-Sources are f = -DIV P (the velocity does not depend on t) and s = theta d/dt eta_R + c_v d/dt theta + DIV Q, with the laws
-(000-26 to 32) and Q = -h/J N grad theta; linear: P = lambda tr(eps) I + 2 mu eps - beta (theta - theta_R) I and
-Q = -h grad theta. (89), (90) as printed have a wrong coefficient and C_v for c_v = rho_R C_v; and their solution stays only
-if the exact velocity drives the whole surface, not one corner.
+Sources are f = -DIV P (the velocity does not depend on t) and s = theta d/dt eta_R + c_v d/dt theta + DIV Q, with the
+laws (000-26 to 32) and Q = -h/J N grad theta; linear: P = lambda tr(eps) I + 2 mu eps - beta (theta - theta_R) I and Q
+= -h grad theta. (89), (90) as printed have a wrong coefficient and C_v for c_v = rho_R C_v; and their solution stays
+only if the exact velocity drives the whole surface, not one corner.
 */
 #include "scenes.h"
 
@@ -136,7 +137,8 @@ static void nonlinear_laws(const map *a, int entropic, const double X[3], manufa
     const double *F = o->F, *H = o->H, warm = o->theta - a->theta_R, power = pow(a->J, a->q - 1);
     const double r = entropic ? o->theta / a->theta_R : 1;
     const double w = entropic ? -a->beta * warm : a->beta * (a->theta_R - o->theta * power);
-    double U_rate = 0, entropy, entropy_rate, energy, div_Q = a->N[0][0] * a->curvature / a->J + a->divN[0] * a->slope / a->J;
+    double U_rate = 0, entropy, entropy_rate, energy,
+           div_Q = a->N[0][0] * a->curvature / a->J + a->divN[0] * a->slope / a->J;
     for (int i = 0; i < 3; i++) {
         double HdivN = 0, divergence;
         for (int k = 0; k < 3; k++) HdivN += H[3 * i + k] * a->divN[k];
@@ -154,7 +156,8 @@ static void nonlinear_laws(const map *a, int entropic, const double X[3], manufa
         div_Q -= a->s / (a->J * a->J) * a->N[i][0] * a->slope;
     }
     energy = a->beta * a->theta_R * (a->J - 1) + (entropic ? 0 : law.U); /* e_R, eta_R and its rate */
-    entropy = a->beta * (fabs(a->q) > 1e-14 ? (pow(a->J, a->q) - 1) / a->q : log(a->J)) - (entropic ? law.U / a->theta_R : 0);
+    entropy =
+        a->beta * (fabs(a->q) > 1e-14 ? (pow(a->J, a->q) - 1) / a->q : log(a->J)) - (entropic ? law.U / a->theta_R : 0);
     entropy_rate = a->beta * power * a->J_rate - (entropic ? U_rate / a->theta_R : 0);
     o->source = o->theta * entropy_rate + a->c_v * a->theta_rate - a->h * div_Q;
     o->entropy = entropy + a->c_v * log(o->theta / a->theta_R);
@@ -235,6 +238,7 @@ static void add_conditions(scene_setup *setup, manufactured *out) {
 
 tlsph_result manufactured_create(const manufactured_parameters *p, manufactured *out, tlsph_error *error) {
     tlsph_fill fill = tlsph_fill_default(3);
+    scene_options options = p->options;
     scene_setup setup;
     tlsph_result result;
     memset(out, 0, sizeof *out);
@@ -246,9 +250,10 @@ tlsph_result manufactured_create(const manufactured_parameters *p, manufactured 
     }
     fill.placement = p->centred ? TLSPH_CELL_CENTRED : TLSPH_ON_FACES;
     fill.jitter = (tlsph_real)p->jitter;
+    if (p->jitter > 0) scene_options_cloud(&options, &fill);
     scene_begin(&setup, &fill, &p->material, error);
     add_conditions(&setup, out);
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, initial_state);
     if (result != TLSPH_OK) scene_destroy(&out->body);
     return result;
@@ -262,7 +267,8 @@ static double ratio(double error, double scale) { return scale > 0 ? sqrt(error 
    inside and not driven (which are exact without merit). */
 static void add_squares(const manufactured *cube, double sum[13][2]) {
     const tlsph_particles *particles = &cube->body.cloud.particles;
-    const double t = (double)tlsph_time(cube->body.solver), theta_R = (double)cube->parameters.material.reference_temperature;
+    const double t = (double)tlsph_time(cube->body.solver),
+                 theta_R = (double)cube->parameters.material.reference_temperature;
     tlsph_real *p = scene_read(cube->body.solver, TLSPH_FIELD_MOMENTUM);
     tlsph_real *P = scene_read(cube->body.solver, TLSPH_FIELD_STRESS);
     tlsph_real *theta = scene_read(cube->body.solver, TLSPH_FIELD_TEMPERATURE);
@@ -272,7 +278,10 @@ static void add_squares(const manufactured *cube, double sum[13][2]) {
         if (depth_of(X) < -1e-3 / cube->parameters.n || is_driven((void *)(size_t)cube, X)) continue;
         exact_at(cube, X, t, &exact);
         for (size_t i = 0; i < 13; i++) {
-            const double is = (double)(i < 3 ? p[3 * a + i] : i < 12 ? P[9 * a + i - 3] : theta[a]) - (i < 12 ? 0 : theta_R);
+            const double is = (double)(i < 3    ? p[3 * a + i]
+                                       : i < 12 ? P[9 * a + i - 3]
+                                                : theta[a]) -
+                              (i < 12 ? 0 : theta_R);
             const double should = i < 3 ? (double)cube->parameters.material.density * exact.v[i]
                                         : i < 12 ? exact.P[i - 3] : exact.theta - theta_R;
             sum[i][0] += (is - should) * (is - should);
