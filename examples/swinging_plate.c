@@ -195,7 +195,7 @@ int main(int argc, char **argv) {
     p->options.projection = 1;
     p->options.cfl = 0.5;
     p->options.end_time = 0.009838; /* a quarter of the period at nu = 0.495: the displacement is largest */
-    p->n = 8;
+    p->n = 6;
     s.levels = 3;
     s.bonds = 1;
     driver_arguments(argc, argv, "swinging_plate", "orders on a plate with an exact solution (002 section 5.1)",
