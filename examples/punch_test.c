@@ -166,7 +166,7 @@ static void check(const run *r) {
     ex_result("kinetic_energy_at_start", r->start.kinetic_energy, "J");
     ex_result("jacobian_least", r->base.now.jacobian_least, "1");
     ex_check_below("jacobian_drift", r->drift, 0.1); /* METHOD section 3 */
-    ex_check_below("energy_change_by_kinetic", r->energy / r->start.kinetic_energy, 1e-8); /* insulated, floor without friction */
+    ex_check_below("energy_change_by_kinetic", r->energy / r->start.kinetic_energy, 1e-8); /* insulated, no friction */
     ex_check_below("asymmetry_x", scene_asymmetry(&r->punch.body, 0), 1e-8);
     ex_check_below("asymmetry_y", scene_asymmetry(&r->punch.body, 1), 1e-8);
 }
@@ -216,7 +216,8 @@ static int run_studies(const punch_test_parameters *base) {
         names[i] = text[i];
         result = punch_test_create(&p, &punch, &error);
         if (result == TLSPH_OK) {
-            snprintf(text[i], sizeof text[i], "%s, %lu", i % 2 ? "eta" : "E", (unsigned long)tlsph_count(punch.body.solver));
+            const unsigned long particles = (unsigned long)tlsph_count(punch.body.solver);
+            snprintf(text[i], sizeof text[i], "%s, %lu", i % 2 ? "eta" : "E", particles);
             result = driver_record(&punch.body, p.options.end_time, 1e-3, read_probe, &punch, h);
             if (result != TLSPH_OK) error = *tlsph_last_error(punch.body.solver);
             scene_destroy(&punch.body);
@@ -228,7 +229,8 @@ static int run_studies(const punch_test_parameters *base) {
     if (!code) {
         for (int j = 0; j < 2; j++)
             printf("%s: to the finest %.3g, %.3g of the range\n", probe_panels[j].title,
-                   driver_difference(&probe[2][0], &probe[0][0], j, NULL), driver_difference(&probe[2][0], &probe[1][0], j, NULL));
+                   driver_difference(&probe[2][0], &probe[0][0], j, NULL),
+                   driver_difference(&probe[2][0], &probe[1][0], j, NULL));
         driver_overlay(&d, "figure18_resolutions.png", histories, names, 2 * STUDIES, probe_panels, 2);
         code = ex_exit_code();
     }

@@ -220,8 +220,9 @@ static void draw_study(driver *d, const study *s) {
 static void report_study(const study *s) {
     double to_next[STUDIES][2];
     for (int i = 0; i < STUDIES; i++) {
-        printf("%lu particles: E against eta %.2g (v_z), %.2g (temperature) of the range", (unsigned long)s[i].particles,
-               driver_difference(&s[i].probe[0], &s[i].probe[1], 0, NULL), driver_difference(&s[i].probe[0], &s[i].probe[1], 1, NULL));
+        const driver_history *E = &s[i].probe[0], *eta = &s[i].probe[1];
+        printf("%lu particles: E against eta %.2g (v_z), %.2g (temperature) of the range",
+               (unsigned long)s[i].particles, driver_difference(E, eta, 0, NULL), driver_difference(E, eta, 1, NULL));
         for (int j = 0; i + 1 < STUDIES && j < 2; j++)
             to_next[i][j] = driver_difference(&s[STUDIES - 1].probe[0], &s[i].probe[0], j, NULL);
         if (i + 1 < STUDIES) printf("; to the finest %.2g and %.2g", to_next[i][0], to_next[i][1]);

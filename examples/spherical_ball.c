@@ -78,7 +78,8 @@ static void draw(run *r) {
         { "fall of the top and of the centre of mass", "[m]", 0, 2, { "top", "centre" } },
         { "temperature", "[K]", 2, 2, { "least", "largest" } } };
     const double radius = r->ball.parameters.wall / r->ball.parameters.n / 2;
-    ex_view view = make_view("pressure [kPa], tension positive", "spherical ball, pressure (000 figure 24)", EX_MAP_DIVERGING);
+    ex_view view = make_view("pressure [kPa], tension positive", "spherical ball, pressure (000 figure 24)",
+                             EX_MAP_DIVERGING);
     driver_render(&r->base, "figure24_pressure.png", &view, r->snapshots, SEQUENCE, 3, radius);
     view = make_view("temperature [K]", "spherical ball, temperature (000 figure 24)", EX_MAP_HEAT);
     driver_render(&r->base, "figure24_temperature.png", &view, r->snapshots + SEQUENCE, SEQUENCE, 3, radius);

@@ -112,8 +112,16 @@ static double measure(const tlsph_operator *view, const tlsph_real *X, const tls
         int lines = 0;
         gather(view, X, values, a, s);
         for (int axis = 0; axis < view->dimension; axis++)
-            if (line_difference(s, axis, &difference)) { moments_add(&differences, difference); sum += difference; lines++; }
-        if (!lines && fit_difference(s, &difference)) { moments_add(&differences, difference); sum = difference; lines = 1; }
+            if (line_difference(s, axis, &difference)) {
+                moments_add(&differences, difference);
+                sum += difference;
+                lines++;
+            }
+        if (!lines && fit_difference(s, &difference)) {
+            moments_add(&differences, difference);
+            sum = difference;
+            lines = 1;
+        }
         if (lines) moments_add(&smoothed, s->centre - sum / lines / 2);
     }
     if (!(differences.squares > 0)) return differences.squares >= 0 ? 0 : HUGE_VAL;

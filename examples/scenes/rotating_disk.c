@@ -48,7 +48,8 @@ static double heated_share(void *user, const scene_face *face) {
     const rotating_disk_parameters *p = user;
     double azimuth;
     const double r = polar(p, face->middle[0], face->middle[1], &azimuth);
-    const double along = (face->area[0] * (face->middle[0] - p->radius) + face->area[1] * (face->middle[1] - p->radius)) / r;
+    const double x = face->middle[0] - p->radius, y = face->middle[1] - p->radius;
+    const double along = (face->area[0] * x + face->area[1] * y) / r;
     return r > (p->radius + p->hole) / 2 && azimuth >= p->heated[0] && azimuth <= p->heated[1] ? along : 0;
 }
 
