@@ -66,10 +66,10 @@ static void draw(run *r) {
     driver_plot(&r->base, "curves.png", &r->history, charts, 4, 2);
 }
 
-/* Numerical damping holds the foot back: at 4, 6 and 8 spacings a radius it stays below table 2 by the shares below
-   (measured), and from 8 on the aim of 0.5 % counts. */
+/* Measured with the lattice: 6.59 mm with 4 spacings a radius, 6.89 with 6, 7.05 with 8. Numerical damping, 8 % of the
+   energy at 4 and 4 % at 8, holds coarse feet back; the sequence passes table 2 near 7 and has not come to rest. */
 static double allowed(const taylor_bar_parameters *p) {
-    return p->n >= 8 ? 0.005 : p->n >= 6 ? 0.025 : 0.07;
+    return p->n >= 8 ? 0.01 : p->n >= 6 ? 0.02 : 0.065;
 }
 static void report(run *r) {
     const taylor_bar_parameters *p = &r->bar.parameters;
