@@ -761,5 +761,25 @@ typedef struct perforated_block { scene_body body; perforated_block_parameters p
 void perforated_block_default(perforated_block_parameters *parameters, int punch);
 tlsph_result perforated_block_create(const perforated_block_parameters *parameters, perforated_block *out,
                                      tlsph_error *error);
+/* ---- satellite-like structure: 001 section 7.1.2, figures 6 to 9 -------------------------------------------------- */
+
+typedef struct satellite_parameters {
+    scene_options options;
+    double spacing;          /* m; divides 1 m evenly, so that arms and cone meet the lattice */
+    double spin;             /* rad/s about Z */
+} satellite_parameters;
+
+typedef struct satellite {
+    scene_body body;
+    satellite_parameters parameters;
+    double centre[3];        /* of mass at the start */
+} satellite;
+
+void satellite_default(satellite_parameters *parameters);
+tlsph_result satellite_create(const satellite_parameters *parameters, satellite *out, tlsph_error *error);
+/* Resultants of figure 9 now, N: sum_a V_a T_a and sum_a V_a D(p_a), made from the operator, the stresses and the pair
+   dissipation of the public interface, not from the solver's own forces; and the sums of their absolute values. For
+   antisymmetric operators and the limited dissipation, without projection's rigid motion. */
+tlsph_result satellite_resultants(const satellite *out, double force[3], double dissipation[3], double size[2]);
 
 #endif
