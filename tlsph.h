@@ -169,7 +169,8 @@ typedef enum tlsph_operator_kind {
     TLSPH_FIRST_KERNEL,     /* the same with the gradient of the first-order kernel (002-6 to 8, appendix A) */
     TLSPH_ZEROTH_BOND,      /* bond-based modified gradient F^c (002-37, 39) of the zeroth-order kernel, */
     TLSPH_BOND,             /* and of the first-order kernel. See [BONDS] for these four */
-    TLSPH_CELLS_4,          /* cells of equal size, fourth order inside and at mirrors, second at free faces: see "order 4" */
+    TLSPH_CELLS_4,          /* cells of a lattice, fourth order inside and at mirrors, second at free faces (see "order 4");
+                               with three stages or more, because TLSPH_RK2 amplifies what it damps so little */
     TLSPH_GIVEN,            /* the host's own pair vectors, antisymmetric: C_ab = -C_ba */
     TLSPH_CLOSED            /* irregular clouds: antisymmetric, closed by `areas`, exact for linear fields; solved once at
                                creation. Best with TLSPH_WENDLAND_C2 and support 0.825 (17 neighbours in 3-D) */
@@ -1483,7 +1484,7 @@ static size_t tlsphi_closed_neighbours(const tlsphi_plan *plan, size_t a, uint32
    parts operator (Strand 1994): there second order, everywhere antisymmetric, closed by the end's area, exact for linear
    fields. At a roller or tangentially fixed face the line goes on as its mirror image, and the order stays.
 
-   Voxel bodies. Every plane at which the cross-section changes cuts the whole lattice; between cuts the body is a set of full
+   Voxel bodies. Every plane at which the cross-section or the cells' size changes cuts the whole lattice; between cuts the body is a set of full
    boxes. A box has the tensor product of its lines' operators (C along x: 2 Q_x H_y H_z areas), and V, C and B of boxes
    that meet add up: faces that meet are whole and have equal weights H_y H_z, because both boxes share the intervals of
    the other axes. So all properties carry over, re-entrant edges included; at a cut the order is that of a free end.
@@ -1499,11 +1500,12 @@ static size_t tlsphi_closed_neighbours(const tlsphi_plan *plan, size_t a, uint32
 
 /* Cells [begin, end) of an axis with one operator. mirror: 0, or the condition's kind, at either end. */
 typedef struct tlsphi_interval {
+    double size; /* of a cell */
     uint32_t begin, end;
     int mirror[2], fourth;
 } tlsphi_interval;
 typedef struct tlsphi_lines {
-    double size[3], low[3];
+    double *plane[3]; /* coordinates of the lattice's planes, rising */
     uint32_t layers[3];
     tlsphi_interval *of_layer[3]; /* the interval of each layer of cells */
     uint32_t *place, *step;       /* lattice place, 3 a particle; neighbours along -x, +x, -y, ... or TLSPHI_NONE */
@@ -1512,7 +1514,7 @@ typedef struct tlsphi_lines {
 typedef struct tlsphi_stencil {
     size_t count;
     uint32_t b[24];
-    double C[24][3], across[24][3], B[3], V, image[6];
+    double C[24][3], across[24][3], B[3], V, image[6], image_moment[3], fineness[3]; /* 1/size */
     int image_kind[6];
 } tlsphi_stencil;
 
@@ -1541,10 +1543,11 @@ static void tlsphi_box_stencil(const tlsphi_plan *plan, size_t a, tlsphi_interva
                                tlsphi_stencil *out) {
     const tlsphi_lines *lattice = plan->lattice;
     double length[3] = {1, 1, 1};
-    for (int x = 0; x < plan->dim; x++) length[x] = tlsphi_line_weight(line[x], i[x]) * lattice->size[x];
+    for (int x = 0; x < plan->dim; x++) length[x] = tlsphi_line_weight(line[x], i[x]) * line[x]->size;
     out->V += length[0] * length[1] * length[2];
     for (int x = 0; x < plan->dim; x++) {
         const double area = length[0] * length[1] * length[2] / length[x];
+        out->fineness[x] = tlsphi_dmax(out->fineness[x], 1 / line[x]->size);
         const uint32_t n = line[x]->end - line[x]->begin;
         for (int side = 0; side < 2; side++) {
             const uint32_t from_end = side ? n - i[x] : i[x];
@@ -1552,6 +1555,7 @@ static void tlsphi_box_stencil(const tlsphi_plan *plan, size_t a, tlsphi_interva
             if (from_end == 0) out->B[x] += side ? area : -area;
             if (from_end == 1 && line[x]->fourth && line[x]->mirror[side]) {
                 out->image[2 * x + side] += area / 6;
+                out->image_moment[x] -= area / 6 * line[x]->size;
                 out->image_kind[2 * x + side] = line[x]->mirror[side];
             }
             for (int reach = 1; reach <= (line[x]->fourth ? 3 : 1); reach++) {
@@ -1599,32 +1603,54 @@ static size_t tlsphi_fourth_neighbours(const tlsphi_plan *plan, size_t a, uint32
 static void tlsphi_image_moment(const tlsphi_plan *plan, size_t a, double A[9]) {
     tlsphi_stencil stencil;
     tlsphi_stencil_of(plan, a, &stencil);
-    for (int x = 0; x < plan->dim; x++)
-        A[4 * x] -= (stencil.image[2 * x] + stencil.image[2 * x + 1]) * plan->lattice->size[x];
+    for (int x = 0; x < plan->dim; x++) A[4 * x] += stencil.image_moment[x];
 }
 
-/* Places on the lattice, which all particles must meet, and steps to the lattice neighbours. */
+/* The planes of an axis, and each particle's place among them. Few planes stand for many particles, so insertion will do. */
+static tlsph_result tlsphi_find_planes(tlsphi_plan *plan, int x) {
+    tlsphi_lines *l = plan->lattice;
+    const size_t most = plan->n < 65536 ? plan->n : 65536;
+    double size[3], *plane = l->plane[x] = TLSPHI_SCRATCH(plan, double, most);
+    size_t count = 0;
+    if (!plane) return tlsphi_no_memory(plan, 8.0 * (double)most);
+    tlsphi_cell_size(plan, 0, size);
+    const double close = (TLSPHI_EPSILON > 1e-10 ? 1e-2 : 1e-6) * size[x];
+    for (int pass = 0; pass < 2; pass++) /* collects the planes, then looks them up */
+        for (size_t a = 0; a < plan->n; a++) {
+            const double X = (double)tlsphi_position(plan, a)[x];
+            size_t low = 0, high = count;
+            while (low < high) {
+                const size_t middle = (low + high) / 2;
+                if (plane[middle] < X - close) low = middle + 1;
+                else high = middle;
+            }
+            l->place[3 * a + (size_t)x] = (uint32_t)low;
+            if (pass || (low < count && plane[low] <= X + close)) continue;
+            if (count == most)
+                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "planes of the lattice", a, (double)count,
+                                        (double)most, "the planes of a lattice of cells");
+            memmove(plane + low + 1, plane + low, (count++ - low) * sizeof *plane);
+            plane[low] = X;
+        }
+    l->layers[x] = (uint32_t)count - 1;
+    return TLSPH_OK;
+}
+/* Steps to the lattice neighbours; every cell must lie between neighbouring planes. */
 static tlsph_result tlsphi_lattice_places(tlsphi_plan *plan, tlsphi_lines *l) {
     const uint32_t *cells = plan->desc->particles.cells;
-    for (int x = 0; x < plan->dim; x++) {
-        l->low[x] = HUGE_VAL;
-        for (size_t a = 0; a < plan->n; a++) l->low[x] = tlsphi_dmin(l->low[x], (double)tlsphi_position(plan, a)[x]);
-    }
-    tlsphi_cell_size(plan, 0, l->size);
-    for (size_t a = 0; a < plan->n; a++)
-        for (int x = 0; x < plan->dim; x++) {
-            const double place = ((double)tlsphi_position(plan, a)[x] - l->low[x]) / l->size[x];
-            if (!(fabs(place - floor(place + 0.5)) < (TLSPHI_EPSILON > 1e-10 ? 1e-2 : 1e-6)) || place > 1e6)
-                return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "place on the lattice", a, place, 0,
-                                        "whole numbers up to 1e6: order 4 needs cells of one size");
-            l->place[3 * a + (size_t)x] = (uint32_t)(place + 0.5);
-            if (l->place[3 * a + (size_t)x] > l->layers[x]) l->layers[x] = l->place[3 * a + (size_t)x];
-        }
+    tlsph_result r;
+    for (int x = 0; x < plan->dim; x++)
+        if ((r = tlsphi_find_planes(plan, x))) return r;
     for (size_t i = 0; i < 6 * plan->n; i++) l->step[i] = TLSPHI_NONE;
     for (size_t c = 0; c < plan->desc->particles.cell_count; c++)
         for (int k = 0; k < 1 << plan->dim; k++)
             for (int x = 0; x < plan->dim; x++) {
                 const uint32_t *corner = cells + (c << plan->dim);
+                const uint32_t a = corner[k], place = l->place[3 * (size_t)corner[0] + (size_t)x] + (uint32_t)(k >> x & 1);
+                if (l->place[3 * (size_t)a + (size_t)x] != place)
+                    return tlsphi_plan_fail(plan, TLSPH_ERROR_ARGUMENT, "plane of a cell's corner", a,
+                                            (double)l->place[3 * (size_t)a + (size_t)x], (double)place,
+                                            "that of its cell: order 4 needs cells between the planes of one lattice");
                 l->step[6 * (size_t)corner[k] + (size_t)(2 * x + !(k >> x & 1))] = corner[k ^ (1 << x)];
             }
     return TLSPH_OK;
@@ -1666,9 +1692,12 @@ static tlsph_result tlsphi_cut_axis(tlsphi_plan *plan, int x, const uint8_t *mir
         pattern[at[x]] += (h ^ h >> 32) | 1;
     }
     for (uint32_t begin = 0, end; begin < layers; begin = end) {
-        tlsphi_interval line = {begin, 0, {0, 0}, 0};
-        for (end = begin + 1; end < layers && pattern[end] == pattern[begin];) end++;
+        tlsphi_interval line = {0, begin, 0, {0, 0}, 0};
+        const double *plane = l->plane[x], first = plane[begin + 1] - plane[begin];
+        for (end = begin + 1; end < layers && pattern[end] == pattern[begin]; end++)
+            if (fabs(plane[end + 1] - plane[end] - first) > (TLSPHI_EPSILON > 1e-10 ? 1e-2 : 1e-6) * first) break;
         line.end = end;
+        line.size = (plane[end] - plane[begin]) / (end - begin);
         if (begin == 0 || pattern[begin - 1] == 0) line.mirror[0] = tlsphi_plane_mirror(plan, mirrors, x, begin);
         if (end == layers || pattern[end] == 0) line.mirror[1] = tlsphi_plane_mirror(plan, mirrors, x, end);
         const int images = (line.mirror[0] != 0) + (line.mirror[1] != 0);
@@ -6552,21 +6581,20 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
                                  (s->sharp ? TLSPHI_SHARP_STEP : 1));
     }
 }
-/* TLSPH_CELLS_4: pairs of the dissipation, areas of the faces, images; the step's length by the cross-sections. */
+/* TLSPH_CELLS_4: pairs of the dissipation, areas of the faces, images; the step's length by the cells, as with TLSPH_CELLS:
+   the smaller volumes at free faces and edges did not lower the stable step. */
 static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
     const size_t D = (size_t)s->dim;
     size_t at = 0, image = 0;
     for (size_t a = 0; plan->lattice && a < s->n; a++) {
         tlsphi_stencil stencil;
         size_t count = 0;
-        double sum = 0;
         tlsphi_stencil_of(plan, plan->host[a], &stencil);
         for (size_t i = 0; i < stencil.count; i++) {
             const double *across = stencil.across[i], size = fabs(across[0]) + fabs(across[1]) + fabs(across[2]);
             if (!(size > 0)) continue;
             for (size_t k = 0; k < D; k++) g[D * count + k] = across[k];
             list[count++] = plan->inner[stencil.b[i]];
-            sum += size;
         }
         tlsphi_sort_pairs(s->dim, list, g, count);
         for (size_t i = 0; i < count; i++, at++) {
@@ -6574,7 +6602,7 @@ static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_
             for (size_t k = 0; k < D; k++) s->damped_g[D * at + k] = (tlsph_real)g[D * i + k];
         }
         s->damped_first[a + 1] = at;
-        s->tau[a] = (tlsph_real)(2 * (double)s->dim * stencil.V / sum);
+        s->tau[a] = (tlsph_real)(s->dim / (stencil.fineness[0] + stencil.fineness[1] + stencil.fineness[2]));
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)stencil.B[k];
         for (int i = 0; i < 6; i++) {
             if (!(stencil.image[i] > 0)) continue;
