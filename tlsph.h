@@ -426,7 +426,7 @@ typedef struct tlsph_desc {
 /* What a solver of a description needs (see tlsph_measure). */
 typedef struct tlsph_size {
     size_t bytes;              /* of the one block */
-    size_t bytes_per_particle; /* of it, without pairs, rounded down */
+    size_t bytes_per_particle; /* of it, without pairs and what all particles share, rounded down */
     size_t bytes_per_pair;
     size_t pairs;              /* directed neighbour pairs */
     size_t neighbours_least, neighbours_most;
@@ -6462,6 +6462,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     const size_t D = (size_t)s->dim, n = s->n;
     (void)TLSPHI_TAKE(arena, tlsph_solver, 1);
     s->materials = TLSPHI_TAKE(arena, tlsphi_material, s->material_count);
+    const size_t fixed = arena->used;
     if (s->material_count > 1) s->material_of = TLSPHI_TAKE(arena, uint8_t, n);
     s->block = TLSPHI_TAKE(arena, tlsphi_block, s->blocks);
     s->body = TLSPHI_TAKE(arena, tlsphi_body, s->bodies);
@@ -6481,7 +6482,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     tlsphi_layout_loads(s, arena, plan);
     const size_t before_pairs = arena->used;
     s->first = TLSPHI_TAKE(arena, size_t, n + 1);
-    s->size.bytes_per_particle = (before_pairs + (n + 1) * sizeof(size_t)) / n;
+    s->size.bytes_per_particle = (before_pairs - fixed + (n + 1) * sizeof(size_t)) / n;
     s->size.bytes_per_pair = sizeof(uint32_t) + ((s->bonds ? 2 : 1) * D + (s->dissipation == TLSPH_JST)) *
                                                     sizeof(tlsph_real);
     s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
@@ -7057,21 +7058,22 @@ TLSPHI_DEF tlsph_result tlsph_material_check(const tlsph_material *material, dou
     memset(&trial, 0, sizeof trial);
     trial.material = material;
     for (int i = 0; i < samples; i++) {
+        const tlsph_material_report before = *report;
         double A[81], heat[9], Q[9], N[3];
         tlsphi_try_sample(&seed, strain, trial.F, Q, N);
         trial.theta = (double)material->reference_temperature * (1 + tlsphi_try_random(&seed) / 4);
         tlsphi_try(&trial, trial.F, trial.theta, &trial.at);
-        if (trial.result == TLSPH_ERROR_INVERSION) { /* too large a strain: another sample */
-            trial.result = TLSPH_OK;
-            report->inverted++;
-            continue;
-        }
         tlsphi_try_tangent(&trial, A, report);
         tlsphi_try_heat(&trial, heat, report);
         tlsphi_try_turned(&trial, Q, report);
         for (int k = 0; k < 3; k++) { /* three directions at right angles */
             for (int j = 0; j < 3; j++) N[j] = Q[3 * j + k];
             tlsphi_try_waves(&trial, A, heat, N, report);
+        }
+        if (trial.result == TLSPH_ERROR_INVERSION) { /* there or beside it: too large a strain, another sample */
+            trial.result = TLSPH_OK;
+            *report = before;
+            report->inverted++;
         }
         if (trial.result)
             return tlsphi_fail(error, trial.result, "material_check", "F[0]", TLSPH_NO_PARTICLE, trial.F[0], 0,
