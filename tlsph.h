@@ -62,7 +62,7 @@ INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
   [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION]
-  [CREATION] [SELF-TEST] [PREFLIGHT] [VORONOI] [FILL] [REPRODUCING] [LICENCE]
+  [CREATION] [SELF-TEST] [PREFLIGHT] [VORONOI] [SHAPES] [FILL] [REPRODUCING] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -520,13 +520,27 @@ typedef enum tlsph_shape {
     TLSPH_L_SHAPE,  /* the box without the quadrant X > origin + notch in the first two directions */
     TLSPH_CYLINDER, /* in the box along `axis`, as wide as fits; hollow with inner_radius. 2-D: a disk, a ring */
     TLSPH_SPHERE,   /* in the box; hollow with inner_radius */
-    TLSPH_PREDICATE /* where inside(user, X) is not 0, within the box */
+    TLSPH_PREDICATE, /* where inside(user, X) is not 0, within the box */
+    TLSPH_DISTANCE,  /* where distance(user, X) is negative, within the box */
+    TLSPH_TRIANGLES  /* in the closed `surface`; TLSPH_SCATTERED only; origin and size are not used */
 } tlsph_shape;
 typedef enum tlsph_placement {
     TLSPH_ON_FACES,     /* particles at cell corners, on the faces of the body, with tributary volumes; default */
-    TLSPH_CELL_CENTRED  /* particles at cell centres, equal volumes */
+    TLSPH_CELL_CENTRED, /* particles at cell centres, equal volumes */
+    TLSPH_SCATTERED     /* an irregular cloud with Voronoi volumes and areas, particles on corners, edges and faces and
+                           inside (see [SHAPES]); not TLSPH_PREDICATE. For TLSPH_CLOSED */
 } tlsph_placement;
 typedef int (*tlsph_inside_fn)(void *user, const tlsph_real X[3]);
+/* A length (m) at X: distance from a body's surface, negative inside; or a spacing. */
+typedef tlsph_real (*tlsph_length_fn)(void *user, const tlsph_real X[3]);
+
+/* A closed surface: triangles of 3 corners, counter-clockwise from outside; in 2-D segments of 2, the body on the left.
+   Corners have 3 reals each (m); those at the same place must be equal to the last bit. */
+typedef struct tlsph_surface {
+    size_t count;
+    const tlsph_real *corners;
+} tlsph_surface;
+
 
 typedef struct tlsph_fill {
     uint32_t cookie;
@@ -543,6 +557,11 @@ typedef struct tlsph_fill {
     int voronoi;                    /* 1: volumes and area vectors from Voronoi cells, for TLSPH_CLOSED; default 0 */
     tlsph_inside_fn inside;         /* TLSPH_PREDICATE */
     void *inside_user;
+    tlsph_length_fn distance;       /* TLSPH_DISTANCE: right near the surface; min joins bodies, max cuts, - turns inside out */
+    void *distance_user;
+    tlsph_surface surface;          /* TLSPH_TRIANGLES */
+    tlsph_length_fn spacing_at;     /* TLSPH_SCATTERED: local spacing, smooth, 1 : 4 at most; NULL: `spacing` */
+    void *spacing_user;
     tlsph_allocator allocator;
 } tlsph_fill;
 
@@ -552,13 +571,6 @@ typedef struct tlsph_cloud {
     tlsph_real cell_size[3];
     void *memory; size_t memory_size; tlsph_allocator allocator;
 } tlsph_cloud;
-
-/* A closed surface: triangles of 3 corners, counter-clockwise from outside; in 2-D segments of 2, the body on the left.
-   Corners have 3 reals each (m); those at the same place must be equal to the last bit. */
-typedef struct tlsph_surface {
-    size_t count;
-    const tlsph_real *corners;
-} tlsph_surface;
 
 /* A solver's discrete operator, read-only, in the solver's own order (see tlsph_operator_view).
    grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab, with C_ab = M_a g_ab + r_ab, M_a = I and r_ab = 0 where they are NULL. */
@@ -733,6 +745,13 @@ TLSPH_API void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real 
 /* W(r) and dW/dr of a normalised kernel of smoothing length h (m) and support radius 2h in 2 or 3 dimensions. */
 TLSPH_API void tlsph_kernel_evaluate(tlsph_kernel kernel, int dimension, tlsph_real r, tlsph_real h, tlsph_real *W,
                                      tlsph_real *dW);
+/* Signed distances (m, negative inside) for bodies of TLSPH_DISTANCE; axis of any length. */
+TLSPH_API tlsph_real tlsph_distance_box(const tlsph_real X[3], const tlsph_real low[3], const tlsph_real high[3]);
+TLSPH_API tlsph_real tlsph_distance_sphere(const tlsph_real X[3], const tlsph_real centre[3], tlsph_real radius);
+TLSPH_API tlsph_real tlsph_distance_cylinder(const tlsph_real X[3], const tlsph_real centre[3], const tlsph_real axis[3],
+                                             tlsph_real radius, tlsph_real length);
+TLSPH_API tlsph_real tlsph_distance_torus(const tlsph_real X[3], const tlsph_real centre[3], const tlsph_real axis[3],
+                                          tlsph_real radius, tlsph_real tube);
 /* All a material gives at deformation gradient F (9) and temperature theta (K), with H = cof F and J = det F.
    ERROR_MATERIAL for impossible constants, ERROR_INVERSION for det F <= 0, ERROR_TEMPERATURE for theta <= 0. */
 TLSPH_API tlsph_result tlsph_material_evaluate(const tlsph_material *material, const tlsph_real *F, tlsph_real theta,
@@ -2202,7 +2221,8 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
    s0 = sum_b w. The volumes' slack leaves gradients of linear fields wrong by up to 2 % in a few particles, 0.2 % on average.
    Where that is too much (`tight_closure`), a second, better conditioned solution starts from the first, with the new B_a: it
    takes the slack of the volumes away and holds l instead, s0 (l_a - first l_a)/10000. It costs as much again, and waves are
-   not the better for it.
+   not the better for it. What the iterations leave of sum C + B is at last taken away by l alone, a graph's Laplacian, so
+   that inside the body a uniform stress exerts no force but round-off.
    Conjugate gradients, one for each component, all in one sweep over the pairs; preconditioner: the inverse of each
    particle's own (1 + D) x (1 + D) block. In units of the largest spacing. */
 
@@ -2212,6 +2232,7 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
 #define TLSPHI_CLOSURE_HOLD 1e-4   /* second solution: slack of l, */
 #define TLSPHI_CLOSURE_REST 1e-6   /* what is left of the volumes' slack, */
 #define TLSPHI_CLOSURE_TIGHT 1e-4  /* largest residual */
+#define TLSPHI_CLOSURE_BALANCE 1e-9 /* largest residual of sum C + B in the end */
 #define TLSPHI_CLOSURE_STEPS 20000 /* iterations, far more than ever needed */
 #define TLSPHI_CLOSURE_BLOCK 256   /* particles a task */
 
@@ -2226,7 +2247,7 @@ typedef struct tlsphi_closer {
     double *sums;                     /* 3 a task */
     double step[3], beta[3];
     double unit;                      /* m */
-    int second;                       /* solution */
+    int second, balances;             /* second solution; l alone */
 } tlsphi_closer;
 
 TLSPHI_INLINE void tlsphi_closure_product(tlsphi_closer *c, size_t i, const int dim) {
@@ -2257,15 +2278,37 @@ TLSPHI_INLINE void tlsphi_closure_product(tlsphi_closer *c, size_t i, const int 
     }
     for (int j = 0; j < 3; j++) c->sums[4 * i + (size_t)j] = sums[j];
 }
+/* The rows and columns of l alone. */
+static void tlsphi_closure_laplacian(tlsphi_closer *c, size_t i) {
+    const size_t rows = c->rows, begin = i * TLSPHI_CLOSURE_BLOCK, D = rows - 1;
+    double *sums = c->sums + 4 * i;
+    sums[0] = sums[1] = sums[2] = 0;
+    for (size_t a = begin; a < begin + TLSPHI_CLOSURE_BLOCK && a < c->n; a++) {
+        const double *pa = c->p + c->width * a;
+        double y[3] = {0, 0, 0};
+        for (size_t k = c->first[a]; k < c->first[a + 1]; k++)
+            for (size_t j = 0; j < D; j++) y[j] += c->pair[rows * k] * (pa[rows * j] - c->p[c->width * c->list[k] + rows * j]);
+        for (size_t j = 0; j < D; j++) {
+            c->q[c->width * a + rows * j] = y[j] += c->slack[rows * a + j] * pa[rows * j];
+            sums[j] += y[j] * pa[rows * j];
+        }
+    }
+}
 static void tlsphi_closure_product_task(void *arg, size_t i) {
     tlsphi_closer *c = (tlsphi_closer *)arg;
-    if (c->plan->dim == 3) tlsphi_closure_product(c, i, 3);
+    if (c->balances) tlsphi_closure_laplacian(c, i);
+    else if (c->plan->dim == 3) tlsphi_closure_product(c, i, 3);
     else tlsphi_closure_product(c, i, 2);
 }
 /* z = inverse block times r, for one component. */
 static void tlsphi_closure_precondition(const tlsphi_closer *c, size_t a, size_t j, double z[4]) {
     const size_t rows = c->rows;
     const double *r = c->r + c->width * a + rows * j, *M = c->block + rows * rows * a;
+    if (c->balances) { /* the diagonal, about: only l moves */
+        memset(z, 0, 4 * sizeof *z);
+        z[0] = M[0] * r[0];
+        return;
+    }
     for (size_t k = 0; k < rows; k++) {
         z[k] = 0;
         for (size_t l = 0; l < rows; l++) z[k] += M[rows * k + l] * r[l];
@@ -2283,7 +2326,7 @@ static void tlsphi_closure_update_task(void *arg, size_t i) {
             for (size_t k = at; k < at + c->rows; k++) {
                 c->x[k] += c->step[j] * c->p[k];
                 c->r[k] -= c->step[j] * c->q[k];
-                sums[3] = tlsphi_dmax(sums[3], fabs(c->r[k]) / c->area[a]);
+                if (k == at || !c->balances) sums[3] = tlsphi_dmax(sums[3], fabs(c->r[k]) / c->area[a]);
             }
             tlsphi_closure_precondition(c, a, j, z);
             for (size_t k = 0; k < c->rows; k++) sums[j] += z[k] * c->r[at + k];
@@ -2316,6 +2359,7 @@ static tlsph_result tlsphi_closure_iterate(tlsphi_closer *c, double limit) {
     tlsph_closure *report = &c->plan->closure;
     for (int j = 0; j < 3; j++) c->step[j] = 0;
     memset(c->p, 0, c->n * c->width * sizeof *c->p);
+    memset(c->q, 0, c->n * c->width * sizeof *c->q);
     tlsphi_closure_run(c, tlsphi_closure_update_task, rz);
     for (; rz[3] > limit; report->iterations++) {
         for (int j = 0; j < c->plan->dim; j++) c->beta[j] = old[j] > 0 ? rz[j] / old[j] : 0;
@@ -2330,7 +2374,7 @@ static tlsph_result tlsphi_closure_iterate(tlsphi_closer *c, double limit) {
             return tlsphi_plan_fail(c->plan, TLSPH_ERROR_NEIGHBOURS, "residual of the closure", TLSPH_NO_PARTICLE, rz[3],
                                     limit, "a cloud whose volumes and areas belong together");
     }
-    report->residual = rz[3];
+    if (!c->balances) report->residual = rz[3];
     return TLSPH_OK;
 }
 
@@ -2561,6 +2605,8 @@ static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, ui
     if (plan->desc->tight_closure &&
         ((r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_TIGHT))))
         return r;
+    c->balances = 1;
+    if ((r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_BALANCE))) return r;
     tlsphi_closure_store(c, host_first, host_list, C);
     plan->closed_first = host_first;
     plan->closed_list = host_list;
@@ -7281,7 +7327,7 @@ static int tlsphi_side(const tlsphi_split_level *cell, const double c[3]) {
                 to[k] = x[k] - p->v[j][k];
             }
             tlsphi_cross3(edge, to, n);
-            in = tlsphi_dot3(n, p->plane) >= -1e-12 * sqrt(tlsphi_dot3(edge, edge) * tlsphi_dot3(to, to));
+            in = tlsphi_dot3(n, p->plane) >= -1e-9 * tlsphi_dot3(to, to); /* edges may have shrunk to nothing */
         }
         if (!in) continue;
         first = at;
@@ -7794,6 +7840,727 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
     return r;
 }
 
+/* ==== [SHAPES] =====================================================================================================
+   Irregular clouds in bodies given by a signed distance or by triangles. A distance is turned into a closed surface first, by
+   dual contouring: where the edges of a grid of half the spacing cross the surface, points and normals are found, each cell
+   takes the point nearest to all their tangent planes, so that flat faces, sharp edges and corners stay what they are, and
+   each crossed grid edge makes a facet between the cells around it. Then particles are set, from corners to edges, faces and
+   the inside, and pushed apart a few times, those of faces within the surface. Their cells give V_a and B_a ([VORONOI]).
+   Everything follows from `seed`. */
+
+#define TLSPHI_SHARP 0.85   /* cosine: edges that bend more are features */
+#define TLSPHI_RELAXATIONS 12
+
+/* splitmix64: the same jitter everywhere for the same seed. */
+static double tlsphi_random(uint64_t *state) {
+    uint64_t z = *state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return (double)((z ^ z >> 31) >> 11) / 9007199254740992.0;
+}
+static double tlsphi_fill_distance(const tlsph_fill *f, const double X[3]) {
+    const tlsph_real at[3] = {(tlsph_real)X[0], (tlsph_real)X[1], (tlsph_real)(f->dimension == 3 ? X[2] : 0)};
+    if (f->shape == TLSPH_DISTANCE) return (double)f->distance(f->distance_user, at);
+    double rr = 0, least = 1e300, beyond = -1e300;
+    for (int i = 0; i < f->dimension; i++) {
+        const double half = (double)f->size[i] / 2, d = X[i] - (double)f->origin[i] - half;
+        if (f->shape == TLSPH_CYLINDER && f->dimension == 3 && i == f->axis) {
+            beyond = fabs(d) - half;
+            continue;
+        }
+        rr += d * d;
+        least = tlsphi_dmin(least, half);
+    }
+    const double shell = tlsphi_dmax(sqrt(rr) - least, f->inner_radius > 0 ? (double)f->inner_radius - sqrt(rr) : -1e300);
+    return tlsphi_dmax(shell, beyond);
+}
+TLSPHI_DEF tlsph_real tlsph_distance_box(const tlsph_real X[3], const tlsph_real low[3], const tlsph_real high[3]) {
+    double out = 0, in = -1e300;
+    for (int k = 0; k < 3; k++) {
+        const double d = tlsphi_dmax((double)(low[k] - X[k]), (double)(X[k] - high[k]));
+        in = tlsphi_dmax(in, d);
+        if (d > 0) out += d * d;
+    }
+    return (tlsph_real)(in > 0 ? sqrt(out) : in);
+}
+/* Distances from an axis through the centre, along it and across it. */
+static void tlsphi_axial(const tlsph_real X[3], const tlsph_real centre[3], const tlsph_real axis[3], double *along,
+                         double *across) {
+    double d[3], n[3];
+    for (int k = 0; k < 3; k++) {
+        d[k] = (double)(X[k] - centre[k]);
+        n[k] = (double)axis[k];
+    }
+    *along = tlsphi_dot3(d, n) / sqrt(tlsphi_dot3(n, n));
+    *across = sqrt(tlsphi_dmax(0, tlsphi_dot3(d, d) - *along * *along));
+}
+TLSPHI_DEF tlsph_real tlsph_distance_sphere(const tlsph_real X[3], const tlsph_real centre[3], tlsph_real radius) {
+    double d[3];
+    for (int k = 0; k < 3; k++) d[k] = (double)(X[k] - centre[k]);
+    return (tlsph_real)(sqrt(tlsphi_dot3(d, d)) - (double)radius);
+}
+TLSPHI_DEF tlsph_real tlsph_distance_cylinder(const tlsph_real X[3], const tlsph_real centre[3], const tlsph_real axis[3],
+                                              tlsph_real radius, tlsph_real length) {
+    double along, across;
+    tlsphi_axial(X, centre, axis, &along, &across);
+    const double side = across - (double)radius, end = fabs(along) - (double)length / 2;
+    const double out = sqrt(pow(tlsphi_dmax(side, 0), 2) + pow(tlsphi_dmax(end, 0), 2));
+    return (tlsph_real)(out > 0 ? out : tlsphi_dmax(side, end));
+}
+TLSPHI_DEF tlsph_real tlsph_distance_torus(const tlsph_real X[3], const tlsph_real centre[3], const tlsph_real axis[3],
+                                           tlsph_real radius, tlsph_real tube) {
+    double along, across;
+    tlsphi_axial(X, centre, axis, &along, &across);
+    return (tlsph_real)(sqrt(pow(across - (double)radius, 2) + along * along) - (double)tube);
+}
+
+/* -- dual contouring -- */
+
+typedef struct tlsphi_contour {
+    const tlsph_fill *fill;
+    double low[3], step;
+    size_t nodes[3];
+    tlsph_real *phi, *vertex; /* per node: distance; of the cell above it: its point, 3 */
+    tlsph_real *out;
+    size_t count;
+} tlsphi_contour;
+
+static size_t tlsphi_contour_node(const tlsphi_contour *c, const size_t i[3]) {
+    return (i[2] * c->nodes[1] + i[1]) * c->nodes[0] + i[0];
+}
+static void tlsphi_contour_node_at(const tlsphi_contour *c, const size_t i[3], double X[3]) {
+    for (int k = 0; k < 3; k++) X[k] = k < c->fill->dimension ? c->low[k] + c->step * (double)i[k] : 0;
+}
+/* Where the distance is zero between two points of opposite sign: bisection, then a secant. */
+static void tlsphi_crossing(const tlsph_fill *f, const double from[3], const double to[3], double X[3]) {
+    double a = 0, b = 1, fa = tlsphi_fill_distance(f, from), fb = tlsphi_fill_distance(f, to), at = 0;
+    for (int i = 0; i < 20; i++) {
+        at = i % 2 ? (a + b) / 2 : a + (b - a) * fa / (fa - fb);
+        for (int k = 0; k < 3; k++) X[k] = from[k] + (to[k] - from[k]) * at;
+        const double now = tlsphi_fill_distance(f, X);
+        if (now == 0 || fa == fb) break;
+        if ((now < 0) == (fa < 0)) a = at, fa = now;
+        else b = at, fb = now;
+    }
+}
+static void tlsphi_distance_normal(const tlsph_fill *f, const double X[3], double step, double n[3]) {
+    double size = 0;
+    for (int k = 0; k < 3; k++) {
+        double Y[3] = {X[0], X[1], X[2]};
+        n[k] = 0;
+        if (k >= f->dimension) continue;
+        Y[k] += step;
+        n[k] = tlsphi_fill_distance(f, Y);
+        Y[k] -= 2 * step;
+        n[k] -= tlsphi_fill_distance(f, Y);
+        size += n[k] * n[k];
+    }
+    for (int k = 0; k < 3; k++) n[k] /= size > 0 ? sqrt(size) : 1;
+}
+/* The point of a cell: least squares of the distances to its tangent planes; weak directions stay at the mean. */
+static void tlsphi_contour_vertex(tlsphi_contour *c, const size_t at[3]) {
+    const int dim = c->fill->dimension;
+    double point[12][3], normal[12][3], mean[3] = {0, 0, 0}, A[9] = {0}, b[3] = {0, 0, 0}, Q[9], low[3];
+    int found = 0;
+    for (int axis = 0; axis < dim; axis++)
+        for (int side = 0; side < 1 << (dim - 1); side++) {
+            size_t i[3] = {at[0], at[1], at[2]}, j[3];
+            double from[3], to[3];
+            i[(axis + 1) % dim] += (size_t)(side & 1);
+            if (dim == 3) i[(axis + 2) % dim] += (size_t)(side >> 1);
+            memcpy(j, i, sizeof j);
+            j[axis]++;
+            if ((c->phi[tlsphi_contour_node(c, i)] < 0) == (c->phi[tlsphi_contour_node(c, j)] < 0)) continue;
+            tlsphi_contour_node_at(c, i, from);
+            tlsphi_contour_node_at(c, j, to);
+            tlsphi_crossing(c->fill, from, to, point[found]);
+            tlsphi_distance_normal(c->fill, point[found], (TLSPHI_EPSILON > 1e-10 ? 1e-2 : 1e-4) * c->step, normal[found]);
+            found++;
+        }
+    if (!found) return;
+    for (int i = 0; i < found; i++)
+        for (int k = 0; k < 3; k++) mean[k] += point[i][k] / found;
+    for (int i = 0; i < found; i++) {
+        double d[3];
+        for (int k = 0; k < 3; k++) d[k] = point[i][k] - mean[k];
+        for (int k = 0; k < 9; k++) A[k] += normal[i][k / 3] * normal[i][k % 3];
+        for (int k = 0; k < 3; k++) b[k] += normal[i][k] * tlsphi_dot3(normal[i], d);
+    }
+    tlsphi_eigen(A, Q);
+    const double most = tlsphi_dmax(A[0], tlsphi_dmax(A[4], A[8]));
+    double X[3] = {mean[0], mean[1], mean[2]};
+    for (int k = 0; k < 3; k++) {
+        if (A[4 * k] < 0.05 * most) continue;
+        const double share = (Q[k] * b[0] + Q[3 + k] * b[1] + Q[6 + k] * b[2]) / A[4 * k];
+        for (int l = 0; l < 3; l++) X[l] += share * Q[3 * l + k];
+    }
+    tlsphi_contour_node_at(c, at, low);
+    for (int k = 0; k < dim; k++) /* far outside its cell: planes that hardly meet */
+        if (X[k] < low[k] - c->step / 2 || X[k] > low[k] + 1.5 * c->step) memcpy(X, mean, sizeof X);
+    for (int k = 0; k < 3; k++) c->vertex[3 * tlsphi_contour_node(c, at) + (size_t)k] = (tlsph_real)X[k];
+}
+/* The facet across the grid edge from node `at` along an axis; with out == NULL only counts it. */
+static void tlsphi_contour_facet(tlsphi_contour *c, const size_t at[3], int axis) {
+    static const int turn[2][6] = {{0, 1, 2, 0, 2, 3}, {0, 2, 1, 0, 3, 2}};
+    const int dim = c->fill->dimension, u = (axis + 1) % dim, w = (axis + 2) % dim;
+    size_t next[3] = {at[0], at[1], at[2]};
+    next[axis]++;
+    const int in = c->phi[tlsphi_contour_node(c, at)] < 0;
+    if (in == (c->phi[tlsphi_contour_node(c, next)] < 0)) return;
+    for (int k = 0; c->out && k < (dim == 3 ? 6 : 2); k++) {
+        size_t cell[3] = {at[0], at[1], at[2]};
+        if (dim == 3) {
+            const int corner = turn[!in][k];
+            cell[u] -= (size_t)(corner == 0 || corner == 3);
+            cell[w] -= (size_t)(corner < 2);
+        } else cell[u] -= (size_t)((k == 0) == (in == (axis == 0)));
+        memcpy(c->out + 3 * ((size_t)dim * c->count + (size_t)k), c->vertex + 3 * tlsphi_contour_node(c, cell), 3 * sizeof *c->out);
+    }
+    c->count += dim == 3 ? 2 : 1;
+}
+/* Visits all cells or edges inside the grid's rim. */
+static void tlsphi_contour_sweep(tlsphi_contour *c, int vertices) {
+    const int dim = c->fill->dimension;
+    size_t i[3];
+    for (i[2] = dim == 3 ? 1 : 0; i[2] + (dim == 3 ? 1 : 0) < c->nodes[2]; i[2]++)
+        for (i[1] = 1; i[1] + 1 < c->nodes[1]; i[1]++)
+            for (i[0] = 1; i[0] + 1 < c->nodes[0]; i[0]++) {
+                if (vertices) tlsphi_contour_vertex(c, i);
+                for (int axis = 0; !vertices && axis < dim; axis++) tlsphi_contour_facet(c, i, axis);
+            }
+}
+static tlsph_result tlsphi_contour_make(tlsphi_plan *plan, const tlsph_fill *f, double spacing, tlsph_surface *surface) {
+    tlsphi_contour c;
+    size_t total = 1, i[3];
+    memset(&c, 0, sizeof c);
+    c.fill = f;
+    c.step = spacing / 2;
+    for (int k = 0; k < 3; k++) { /* an odd offset keeps the nodes off the faces of most bodies */
+        c.low[k] = (double)f->origin[k] - (2.3719 + 0.0413 * k) * c.step;
+        c.nodes[k] = k < f->dimension ? (size_t)((double)f->size[k] / c.step + 6) : 1;
+        total *= c.nodes[k];
+    }
+    c.phi = TLSPHI_SCRATCH(plan, tlsph_real, total);
+    c.vertex = TLSPHI_SCRATCH(plan, tlsph_real, 3 * total);
+    if (!c.phi || !c.vertex) return tlsphi_no_memory(plan, 32.0 * (double)total);
+    for (i[2] = 0; i[2] < c.nodes[2]; i[2]++)
+        for (i[1] = 0; i[1] < c.nodes[1]; i[1]++)
+            for (i[0] = 0; i[0] < c.nodes[0]; i[0]++) {
+                double X[3];
+                tlsphi_contour_node_at(&c, i, X);
+                c.phi[tlsphi_contour_node(&c, i)] = (tlsph_real)tlsphi_fill_distance(f, X);
+                for (int k = 0; k < f->dimension; k++)
+                    if ((i[k] < 2 || i[k] + 2 >= c.nodes[k]) && c.phi[tlsphi_contour_node(&c, i)] < 0)
+                        return tlsphi_surface_fail(plan->error, "distance beyond origin and size", X,
+                                                   (double)c.phi[tlsphi_contour_node(&c, i)], "more than 0: a box around the body");
+            }
+    tlsphi_contour_sweep(&c, 1);
+    tlsphi_contour_sweep(&c, 0);
+    if (!(c.out = TLSPHI_SCRATCH(plan, tlsph_real, 3 * (size_t)f->dimension * c.count + 1)))
+        return tlsphi_no_memory(plan, 72.0 * (double)c.count);
+    c.count = 0;
+    tlsphi_contour_sweep(&c, 0);
+    surface->count = c.count;
+    surface->corners = c.out;
+    return TLSPH_OK;
+}
+
+/* -- setting particles -- */
+
+typedef struct tlsphi_sampler {
+    const tlsph_fill *fill;
+    tlsphi_voronoi v; /* bins of facets and scratch */
+    tlsphi_mesh mesh;
+    double *X;        /* 3 each */
+    uint8_t *kind;    /* 0 fixed, 1 on the surface, 2 inside */
+    uint32_t *next;   /* of the same bin */
+    uint32_t *head;   /* per bin of particles */
+    size_t count, capacity, bins[3];
+    double low[3], bin, largest; /* largest spacing */
+    uint64_t random;
+} tlsphi_sampler;
+
+static double tlsphi_local_spacing(const tlsph_fill *f, const double X[3]) {
+    const tlsph_real at[3] = {(tlsph_real)X[0], (tlsph_real)X[1], (tlsph_real)X[2]};
+    const double s = f->spacing_at ? (double)f->spacing_at(f->spacing_user, at) : (double)f->spacing;
+    return s > (double)f->spacing / 64 ? s : (double)f->spacing;
+}
+static void tlsphi_sample_cell(const tlsphi_sampler *s, const double X[3], size_t at[3]) {
+    for (int k = 0; k < 3; k++)
+        at[k] = (size_t)tlsphi_dmin((double)s->bins[k] - 1, tlsphi_dmax(0, floor((X[k] - s->low[k]) / s->bin)));
+}
+/* Calls for every particle within reach of X; stops when visit returns 1, and returns that. */
+typedef int (*tlsphi_near_fn)(tlsphi_sampler *s, size_t b, const double d[3], double r, void *arg);
+static int tlsphi_sample_near(tlsphi_sampler *s, const double X[3], double reach, tlsphi_near_fn visit, void *arg) {
+    size_t from[3], to[3], at[3];
+    double Y[3];
+    for (int k = 0; k < 3; k++) Y[k] = X[k] - reach;
+    tlsphi_sample_cell(s, Y, from);
+    for (int k = 0; k < 3; k++) Y[k] = X[k] + reach;
+    tlsphi_sample_cell(s, Y, to);
+    for (at[2] = from[2]; at[2] <= to[2]; at[2]++)
+        for (at[1] = from[1]; at[1] <= to[1]; at[1]++)
+            for (at[0] = from[0]; at[0] <= to[0]; at[0]++)
+                for (uint32_t b = s->head[(at[2] * s->bins[1] + at[1]) * s->bins[0] + at[0]]; b != TLSPHI_NONE; b = s->next[b]) {
+                    double d[3];
+                    for (int k = 0; k < 3; k++) d[k] = X[k] - s->X[3 * b + (uint32_t)k];
+                    const double r = sqrt(tlsphi_dot3(d, d));
+                    if (r < reach && visit(s, b, d, r, arg)) return 1;
+                }
+    return 0;
+}
+static int tlsphi_sample_any(tlsphi_sampler *s, size_t b, const double d[3], double r, void *arg) {
+    (void)s;
+    (void)b;
+    (void)d;
+    (void)r;
+    (void)arg;
+    return 1;
+}
+static void tlsphi_sample_link(tlsphi_sampler *s, size_t a) {
+    size_t at[3];
+    tlsphi_sample_cell(s, s->X + 3 * a, at);
+    uint32_t *head = s->head + (at[2] * s->bins[1] + at[1]) * s->bins[0] + at[0];
+    s->next[a] = *head;
+    *head = (uint32_t)a;
+}
+static tlsph_result tlsphi_sample_add(tlsphi_sampler *s, const double X[3], int kind) {
+    if (s->count == s->capacity) {
+        const size_t more = s->capacity ? 2 * s->capacity : 4096;
+        double *X2 = TLSPHI_SCRATCH(&s->v.plan, double, 3 * more);
+        uint8_t *kind2 = TLSPHI_SCRATCH(&s->v.plan, uint8_t, more);
+        uint32_t *next2 = TLSPHI_SCRATCH(&s->v.plan, uint32_t, more);
+        if (!X2 || !kind2 || !next2 || more > 1000000000u) return tlsphi_no_memory(&s->v.plan, 29.0 * (double)more);
+        if (s->count) {
+            memcpy(X2, s->X, 3 * s->count * sizeof *X2);
+            memcpy(kind2, s->kind, s->count);
+            memcpy(next2, s->next, s->count * sizeof *next2);
+        }
+        s->X = X2;
+        s->kind = kind2;
+        s->next = next2;
+        s->capacity = more;
+    }
+    memcpy(s->X + 3 * s->count, X, 3 * sizeof *X);
+    s->kind[s->count] = (uint8_t)kind;
+    tlsphi_sample_link(s, s->count++);
+    return TLSPH_OK;
+}
+/* A particle at X, unless another is nearer than share x spacing. */
+static tlsph_result tlsphi_sample_try(tlsphi_sampler *s, const double X[3], int kind, double share) {
+    if (tlsphi_sample_near(s, X, share * tlsphi_local_spacing(s->fill, X), tlsphi_sample_any, NULL)) return TLSPH_OK;
+    return tlsphi_sample_add(s, X, kind);
+}
+/* Nearest point of a facet (2-D: of a segment) to P. */
+static void tlsphi_nearest_on_facet(const tlsphi_mesh *m, size_t facet, const double P[3], double out[3]) {
+    double best = 1e300, n[3], v[3][3], d[3];
+    tlsphi_mesh_normal(m, facet, n);
+    for (int c = 0; c < m->corners; c++) tlsphi_mesh_point(m, facet, c, v[c]);
+    if (m->dim == 3) { /* the foot of the perpendicular, if it is inside */
+        int in = 1;
+        for (int k = 0; k < 3; k++) d[k] = P[k] - v[0][k];
+        const double off = tlsphi_dot3(d, n);
+        for (int k = 0; k < 3; k++) out[k] = P[k] - off * n[k];
+        for (int c = 0; c < 3 && in; c++) {
+            double edge[3], to[3], x[3];
+            for (int k = 0; k < 3; k++) {
+                edge[k] = v[(c + 1) % 3][k] - v[c][k];
+                to[k] = out[k] - v[c][k];
+            }
+            tlsphi_cross3(edge, to, x);
+            in = tlsphi_dot3(x, n) >= 0;
+        }
+        if (in) return;
+    }
+    for (int c = 0; c < (m->dim == 3 ? 3 : 1); c++) {
+        double edge[3], to[3], x[3], rr = 0;
+        for (int k = 0; k < 3; k++) {
+            edge[k] = v[(c + 1) % m->corners][k] - v[c][k];
+            to[k] = P[k] - v[c][k];
+        }
+        const double at = tlsphi_dmin(1, tlsphi_dmax(0, tlsphi_dot3(to, edge) / (tlsphi_dot3(edge, edge) + 1e-300)));
+        for (int k = 0; k < 3; k++) {
+            x[k] = v[c][k] + at * edge[k];
+            rr += (x[k] - P[k]) * (x[k] - P[k]);
+        }
+        if (!(rr < best)) continue;
+        best = rr;
+        memcpy(out, x, sizeof x);
+    }
+}
+/* Signed distance to the surface and its nearest point, in growing rings of bins. Where facets are equally near (an edge),
+   the one most across tells the side. */
+static double tlsphi_surface_distance(tlsphi_sampler *s, const double P[3], double nearest[3]) {
+    tlsphi_voronoi *v = &s->v;
+    double best = 1e300, across = 0;
+    long at[3], most = 0;
+    for (int k = 0; k < 3; k++) {
+        at[k] = (long)tlsphi_dmin((double)v->bins[k] - 1, tlsphi_dmax(0, floor((P[k] - v->low[k]) / v->bin)));
+        most = most > (long)v->bins[k] ? most : (long)v->bins[k];
+    }
+    v->stamped++;
+    for (long ring = 0; ring <= most && best > (double)(ring - 1) * v->bin; ring++)
+        for (long z = at[2] - ring; z <= at[2] + ring; z++)
+            for (long y = at[1] - ring; y <= at[1] + ring; y++) {
+                const int rim = labs(z - at[2]) == ring || labs(y - at[1]) == ring;
+                if (z < 0 || y < 0 || z >= (long)v->bins[2] || y >= (long)v->bins[1]) continue;
+                for (long x = at[0] - ring; x <= at[0] + ring; x += rim || !ring ? 1 : 2 * ring) {
+                    if (x < 0 || x >= (long)v->bins[0]) continue;
+                    const size_t b = ((size_t)z * v->bins[1] + (size_t)y) * v->bins[0] + (size_t)x;
+                    for (size_t i = v->bin_first[b]; i < v->bin_first[b + 1]; i++) {
+                        const uint32_t f = v->bin_facet[i];
+                        double Q[3], n[3], d[3];
+                        if (v->stamp[f] == v->stamped) continue;
+                        v->stamp[f] = v->stamped;
+                        tlsphi_nearest_on_facet(&s->mesh, f, P, Q);
+                        for (int k = 0; k < 3; k++) d[k] = P[k] - Q[k];
+                        const double r = sqrt(tlsphi_dot3(d, d));
+                        if (r > best * (1 + 1e-9)) continue;
+                        tlsphi_mesh_normal(&s->mesh, f, n);
+                        const double off = tlsphi_dot3(d, n);
+                        if (r > best * (1 - 1e-9) && fabs(off) <= fabs(across)) continue;
+                        best = r;
+                        across = off;
+                        memcpy(nearest, Q, sizeof Q);
+                    }
+                }
+            }
+    return across < 0 ? -best : best;
+}
+static double tlsphi_sample_distance(tlsphi_sampler *s, const double X[3]) {
+    double nearest[3];
+    return s->fill->shape == TLSPH_DISTANCE || s->fill->shape == TLSPH_SPHERE || s->fill->shape == TLSPH_CYLINDER
+               ? tlsphi_fill_distance(s->fill, X)
+               : tlsphi_surface_distance(s, X, nearest);
+}
+
+/* -- lines of sharp edges (2-D: the whole surface) -- */
+
+typedef struct tlsphi_features {
+    uint32_t (*end)[2];    /* vertices of each feature edge */
+    uint32_t (*edge_of)[2]; /* the first two feature edges of each vertex */
+    uint32_t *degree;
+    uint8_t *corner, *used;
+    size_t count;
+} tlsphi_features;
+
+static void tlsphi_vertex_point(const tlsphi_mesh *m, uint32_t vertex, double X[3]) {
+    const size_t i = m->first_corner[vertex];
+    tlsphi_mesh_point(m, i / (size_t)m->corners, (int)(i % (size_t)m->corners), X);
+}
+static void tlsphi_feature_add(tlsphi_features *l, uint32_t u, uint32_t w) {
+    const uint32_t ends[2] = {u, w};
+    for (int k = 0; k < 2; k++) {
+        l->end[l->count][k] = ends[k];
+        if (l->degree[ends[k]] < 2) l->edge_of[ends[k]][l->degree[ends[k]]] = (uint32_t)l->count;
+        l->degree[ends[k]]++;
+    }
+    l->count++;
+}
+static uint32_t tlsphi_other_end(const tlsphi_features *l, uint32_t edge, uint32_t vertex) {
+    return l->end[edge][0] == vertex ? l->end[edge][1] : l->end[edge][0];
+}
+static tlsph_result tlsphi_feature_find(tlsphi_sampler *s, tlsphi_features *l) {
+    tlsphi_mesh *m = &s->mesh;
+    tlsphi_plan *plan = &s->v.plan;
+    const size_t n = (size_t)m->corners * m->facets;
+    memset(l, 0, sizeof *l);
+    l->end = (uint32_t (*)[2])tlsphi_scratch_take(plan, n, sizeof *l->end);
+    l->edge_of = (uint32_t (*)[2])tlsphi_scratch_take(plan, m->vertices, sizeof *l->edge_of);
+    l->degree = TLSPHI_SCRATCH(plan, uint32_t, m->vertices);
+    l->corner = TLSPHI_SCRATCH(plan, uint8_t, m->vertices);
+    l->used = TLSPHI_SCRATCH(plan, uint8_t, n);
+    if (!l->end || !l->edge_of || !l->degree || !l->corner || !l->used) return tlsphi_no_memory(plan, 40.0 * (double)n);
+    for (size_t f = 0; m->dim == 2 && f < m->facets; f++) tlsphi_feature_add(l, m->vertex[2 * f], m->vertex[2 * f + 1]);
+    for (size_t i = 0; m->dim == 3 && i + 1 < n; i++) {
+        double a[3], b[3];
+        if (m->edge[i] != m->edge[i + 1] || (i && m->edge[i - 1] == m->edge[i])) continue;
+        tlsphi_mesh_normal(m, m->half[i] / 3, a);
+        tlsphi_mesh_normal(m, m->half[i + 1] / 3, b);
+        if (tlsphi_dot3(a, b) < TLSPHI_SHARP)
+            tlsphi_feature_add(l, (uint32_t)(m->edge[i] >> 32), (uint32_t)m->edge[i]);
+    }
+    for (uint32_t v = 0; v < m->vertices; v++) {
+        double X[3], Y[2][3];
+        l->corner[v] = l->degree[v] != 0 && l->degree[v] != 2;
+        if (l->degree[v] != 2) continue;
+        tlsphi_vertex_point(m, v, X);
+        for (int k = 0; k < 2; k++) {
+            tlsphi_vertex_point(m, tlsphi_other_end(l, l->edge_of[v][k], v), Y[k]);
+            for (int i = 0; i < 3; i++) Y[k][i] -= X[i];
+        }
+        l->corner[v] = -tlsphi_dot3(Y[0], Y[1]) < TLSPHI_SHARP * sqrt(tlsphi_dot3(Y[0], Y[0]) * tlsphi_dot3(Y[1], Y[1]));
+    }
+    return TLSPH_OK;
+}
+/* Walks a line from `vertex` along `edge` to the next corner. With `every` <= 0 only measures it, in spacings; else sets a
+   particle after each `every`. */
+static tlsph_result tlsphi_line_walk(tlsphi_sampler *s, tlsphi_features *l, uint32_t vertex, uint32_t edge, double every,
+                                     size_t wanted, double *length) {
+    double A[3], B[3], done = 0;
+    size_t placed = 0;
+    const uint32_t start = vertex;
+    for (;;) {
+        const uint32_t to = tlsphi_other_end(l, edge, vertex);
+        double size = 0, X[3];
+        l->used[edge] = 1;
+        tlsphi_vertex_point(&s->mesh, vertex, A);
+        tlsphi_vertex_point(&s->mesh, to, B);
+        for (int k = 0; k < 3; k++) {
+            size += (B[k] - A[k]) * (B[k] - A[k]);
+            X[k] = (A[k] + B[k]) / 2;
+        }
+        const double step = sqrt(size) / tlsphi_local_spacing(s->fill, X);
+        while (every > 0 && placed < wanted && (double)(placed + 1) * every <= done + step * (1 + 1e-9)) {
+            const double at = ((double)++placed * every - done) / step;
+            for (int k = 0; k < 3; k++) X[k] = A[k] + (B[k] - A[k]) * at;
+            const tlsph_result r = tlsphi_sample_add(s, X, 0);
+            if (r) return r;
+        }
+        done += step;
+        vertex = to;
+        if (l->corner[to] || to == start) break;
+        edge = l->edge_of[to][0] == edge ? l->edge_of[to][1] : l->edge_of[to][0];
+    }
+    *length = done;
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_sample_lines(tlsphi_sampler *s) {
+    tlsphi_features l;
+    tlsph_result r = tlsphi_feature_find(s, &l);
+    for (uint32_t v = 0; !r && v < s->mesh.vertices; v++) {
+        double X[3];
+        tlsphi_vertex_point(&s->mesh, v, X);
+        if (l.corner[v]) r = tlsphi_sample_try(s, X, 0, 0.3);
+    }
+    for (int loops = 0; loops < 2; loops++) /* lines between corners, then closed ones */
+        for (uint32_t e = 0; !r && e < l.count; e++) {
+            uint32_t from = l.end[e][0];
+            double length, X[3];
+            if (l.used[e]) continue;
+            if (!l.corner[from]) from = l.end[e][1];
+            if (!loops && !l.corner[from]) continue;
+            tlsphi_vertex_point(&s->mesh, from, X);
+            if (loops && (r = tlsphi_sample_add(s, X, 0))) return r;
+            r = tlsphi_line_walk(s, &l, from, e, 0, 0, &length);
+            const double parts = floor(length + 0.5);
+            if (!r && parts > 1) r = tlsphi_line_walk(s, &l, from, e, length / parts, (size_t)parts - 1, &length);
+        }
+    return r;
+}
+
+/* -- faces and inside -- */
+
+static tlsph_result tlsphi_sample_faces(tlsphi_sampler *s) {
+    const tlsphi_mesh *m = &s->mesh;
+    double *sum = TLSPHI_SCRATCH(&s->v.plan, double, m->facets + 1);
+    if (!sum) return tlsphi_no_memory(&s->v.plan, 8.0 * (double)m->facets);
+    for (size_t f = 0; f < m->facets; f++) { /* area in squares of the local spacing */
+        double n[3], X[3] = {0, 0, 0}, v[3];
+        for (int c = 0; c < 3; c++) {
+            tlsphi_mesh_point(m, f, c, v);
+            for (int k = 0; k < 3; k++) X[k] += v[k] / 3;
+        }
+        sum[f + 1] = sum[f] + tlsphi_mesh_normal(m, f, n) / pow(tlsphi_local_spacing(s->fill, X), 2);
+    }
+    const size_t tries = (size_t)(30 * sum[m->facets]) + 64;
+    size_t step = (size_t)(0.6180339887 * (double)tries) | 1, i = 0;
+    for (size_t a = tries, b = step % tries; b || a != 1;) { /* make it coprime, so that every share of the area has its turn */
+        if (!b) {
+            step += 2;
+            a = tries;
+            b = step % tries;
+            continue;
+        }
+        const size_t rest = a % b;
+        a = b;
+        b = rest;
+    }
+    for (size_t t = 0; t < tries; t++, i = (i + step) % tries) {
+        const double at = sum[m->facets] * ((double)i + tlsphi_random(&s->random)) / (double)tries;
+        double u = tlsphi_random(&s->random), w = tlsphi_random(&s->random), v[3][3], X[3];
+        size_t low = 0, high = m->facets;
+        while (high - low > 1) {
+            const size_t middle = (low + high) / 2;
+            if (sum[middle] <= at) low = middle;
+            else high = middle;
+        }
+        if (u + w > 1) u = 1 - u, w = 1 - w;
+        for (int c = 0; c < 3; c++) tlsphi_mesh_point(m, low, c, v[c]);
+        for (int k = 0; k < 3; k++) X[k] = v[0][k] + u * (v[1][k] - v[0][k]) + w * (v[2][k] - v[0][k]);
+        const tlsph_result r = tlsphi_sample_try(s, X, 1, 0.82);
+        if (r) return r;
+    }
+    return TLSPH_OK;
+}
+/* A lattice that fits the bounds, or, where the spacing varies, random places that keep their distance. */
+static tlsph_result tlsphi_sample_inside(tlsphi_sampler *s) {
+    const tlsphi_mesh *m = &s->mesh;
+    const int varies = s->fill->spacing_at != NULL;
+    size_t cells[3], i[3];
+    double width[3];
+    for (int k = 0; k < 3; k++) {
+        cells[k] = k < m->dim ? (size_t)((m->high[k] - m->low[k]) / s->largest + 0.5) : 1;
+        if (!cells[k]) cells[k] = 1;
+        width[k] = (m->high[k] - m->low[k]) / (double)cells[k];
+    }
+    for (int pass = 0; pass < (varies ? 24 : 1); pass++)
+        for (i[2] = 0; i[2] < cells[2]; i[2]++)
+            for (i[1] = 0; i[1] < cells[1]; i[1]++)
+                for (i[0] = 0; i[0] < cells[0]; i[0]++) {
+                    double X[3], middle[3];
+                    for (int k = 0; k < 3; k++) middle[k] = m->low[k] + width[k] * ((double)i[k] + 0.5);
+                    const double ratio = s->largest / tlsphi_local_spacing(s->fill, middle);
+                    const size_t tries = varies ? (size_t)ceil(m->dim == 3 ? ratio * ratio * ratio : ratio * ratio) : 1;
+                    for (size_t t = 0; t < tries; t++) {
+                        for (int k = 0; k < 3; k++) {
+                            const double shift = tlsphi_random(&s->random);
+                            X[k] = m->low[k] + width[k] * ((double)i[k] + (varies ? shift : (2 * shift - 1) * (double)s->fill->jitter));
+                            if (k >= m->dim) X[k] = 0;
+                        }
+                        const double h = tlsphi_local_spacing(s->fill, X);
+                        const double share = varies ? (m->dim == 3 ? 0.87 : 0.83) : 0.5;
+                        if (tlsphi_sample_near(s, X, share * h, tlsphi_sample_any, NULL)) continue;
+                        if (!(tlsphi_sample_distance(s, X) < -0.5 * h)) continue;
+                        const tlsph_result r = tlsphi_sample_add(s, X, 2);
+                        if (r) return r;
+                    }
+                }
+    return TLSPH_OK;
+}
+typedef struct tlsphi_push {
+    double h, move[3];
+    size_t self;
+} tlsphi_push;
+static int tlsphi_sample_push(tlsphi_sampler *s, size_t b, const double d[3], double r, void *arg) {
+    tlsphi_push *push = (tlsphi_push *)arg;
+    const double q = 1 - r / (1.5 * push->h);
+    (void)s;
+    if (b == push->self || !(r > 0)) return 0;
+    for (int k = 0; k < 3; k++) push->move[k] += q * q * d[k] / r;
+    return 0;
+}
+/* Particles push each other apart, one after the other: faces within the surface, the inside by less than reaches it. */
+static void tlsphi_sample_relax(tlsphi_sampler *s) {
+    const size_t bins = s->bins[0] * s->bins[1] * s->bins[2];
+    for (int pass = 0; pass < TLSPHI_RELAXATIONS; pass++) {
+        for (size_t a = 0; a < s->count; a++) {
+            double *X = s->X + 3 * a, Y[3];
+            tlsphi_push push;
+            if (!s->kind[a]) continue;
+            memset(&push, 0, sizeof push);
+            push.h = tlsphi_local_spacing(s->fill, X);
+            push.self = a;
+            tlsphi_sample_near(s, X, 1.5 * push.h, tlsphi_sample_push, &push);
+            const double size = sqrt(tlsphi_dot3(push.move, push.move)), step = tlsphi_dmin(0.3, 0.15 / (size + 1e-300)) * push.h;
+            for (int k = 0; k < 3; k++) Y[k] = X[k] + (k < s->mesh.dim ? step * push.move[k] : 0);
+            if (s->kind[a] == 1) tlsphi_surface_distance(s, Y, X);
+            else if (tlsphi_sample_distance(s, Y) < -0.4 * push.h) memcpy(X, Y, sizeof Y);
+        }
+        for (size_t b = 0; b < bins; b++) s->head[b] = TLSPHI_NONE;
+        for (size_t a = 0; a < s->count; a++) tlsphi_sample_link(s, a);
+    }
+}
+static tlsph_result tlsphi_sample_begin(tlsphi_sampler *s, tlsph_error *error) {
+    const tlsph_fill *f = s->fill;
+    tlsphi_plan *plan = &s->v.plan;
+    double least = 1e300;
+    tlsph_surface surface = f->surface;
+    tlsph_result r;
+    for (int i = 0; i < 4096; i++) { /* the range of spacings, from a grid of 16^3 places */
+        const int at[3] = {i % 16, i / 16 % 16, f->dimension == 3 ? i / 256 : 0};
+        double X[3];
+        for (int k = 0; k < 3; k++) X[k] = (double)f->origin[k] + (double)f->size[k] * at[k] / 15;
+        const double h = tlsphi_local_spacing(f, X);
+        least = tlsphi_dmin(least, h);
+        s->largest = tlsphi_dmax(s->largest, h);
+    }
+    if (f->shape != TLSPH_TRIANGLES && (r = tlsphi_contour_make(plan, f, least, &surface))) return r;
+    if ((r = tlsphi_mesh_make(&s->mesh, plan, f->dimension, &surface, error))) return r;
+    if ((r = tlsphi_voronoi_bins(&s->v, &s->mesh, s->largest))) return r;
+    size_t total = 1;
+    s->bin = 1.5 * s->largest;
+    for (int k = 0; k < f->dimension; k++) s->bin = tlsphi_dmax(s->bin, (s->mesh.high[k] - s->mesh.low[k]) / 1000);
+    for (int k = 0; k < 3; k++) {
+        s->low[k] = s->mesh.low[k];
+        s->bins[k] = (size_t)((s->mesh.high[k] - s->mesh.low[k]) / s->bin) + 1;
+        total *= s->bins[k];
+    }
+    if (!(s->head = TLSPHI_SCRATCH(plan, uint32_t, total))) return tlsphi_no_memory(plan, 4.0 * (double)total);
+    for (size_t b = 0; b < total; b++) s->head[b] = TLSPHI_NONE;
+    if ((r = tlsphi_sample_lines(s)) || (f->dimension == 3 && (r = tlsphi_sample_faces(s))) || (r = tlsphi_sample_inside(s)))
+        return r;
+    tlsphi_sample_relax(s);
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_sample_store(tlsphi_sampler *s, tlsph_cloud *cloud, tlsph_error *error) {
+    const size_t n = s->count, dim = (size_t)s->fill->dimension;
+    tlsphi_arena arena;
+    tlsph_real *X = NULL, *V = NULL, *w = NULL, *B = NULL, *h = NULL;
+    tlsph_surface surface;
+    memset(&arena, 0, sizeof arena);
+    for (int pass = 0; pass < 2; pass++) {
+        arena.used = 0;
+        X = TLSPHI_TAKE(&arena, tlsph_real, 3 * n);
+        V = TLSPHI_TAKE(&arena, tlsph_real, n);
+        w = TLSPHI_TAKE(&arena, tlsph_real, n);
+        B = TLSPHI_TAKE(&arena, tlsph_real, 3 * n);
+        h = TLSPHI_TAKE(&arena, tlsph_real, n);
+        if (pass) break;
+        cloud->memory_size = arena.size = arena.used;
+        cloud->allocator = s->v.plan.allocator;
+        cloud->memory = cloud->allocator.allocate(cloud->allocator.user, cloud->memory_size);
+        if (!cloud->memory) return tlsphi_no_memory(&s->v.plan, (double)cloud->memory_size);
+        arena.memory = (unsigned char *)cloud->memory;
+    }
+    for (size_t a = 0; a < n; a++) {
+        const double local = tlsphi_local_spacing(s->fill, s->X + 3 * a);
+        for (size_t k = 0; k < 3; k++) X[3 * a + k] = (tlsph_real)s->X[3 * a + k];
+        w[a] = (tlsph_real)pow(local, (double)dim);
+        h[a] = (tlsph_real)local;
+    }
+    cloud->particles.count = n;
+    cloud->particles.positions = X;
+    cloud->particles.volumes = V;
+    cloud->particles.weights = w;
+    cloud->particles.areas = B;
+    cloud->particles.spacing = (tlsph_real)s->largest;
+    if (s->fill->spacing_at) cloud->particles.spacings = h;
+    for (size_t k = 0; k < dim; k++) cloud->cell_size[k] = (tlsph_real)s->largest;
+    surface.count = s->mesh.facets;
+    surface.corners = s->mesh.given;
+    return tlsph_voronoi((int)dim, &cloud->particles, &surface, &cloud->allocator, V, B, error);
+}
+/* surface: of boxes and the like, or none. */
+static tlsph_result tlsphi_cloud_scatter(const tlsph_fill *fill, const tlsph_surface *surface, tlsph_cloud *cloud,
+                                         tlsph_error *error) {
+    tlsphi_sampler s;
+    tlsph_fill copy = *fill;
+    memset(&s, 0, sizeof s);
+    if (surface) {
+        copy.surface = *surface;
+        copy.shape = TLSPH_TRIANGLES;
+    }
+    for (int k = 0; k < 3 && copy.shape == TLSPH_TRIANGLES; k++) {
+        const size_t corners = copy.surface.count * (size_t)copy.dimension;
+        tlsph_real high = copy.surface.corners[k];
+        copy.origin[k] = high;
+        for (size_t i = 0; i < corners; i++) {
+            copy.origin[k] = tlsphi_min(copy.origin[k], copy.surface.corners[3 * i + (size_t)k]);
+            high = tlsphi_max(high, copy.surface.corners[3 * i + (size_t)k]);
+        }
+        copy.size[k] = high - copy.origin[k];
+    }
+    s.fill = &copy;
+    s.random = fill->seed;
+    s.v.plan.error = error;
+    s.v.plan.allocator = tlsphi_allocator(&fill->allocator);
+    tlsph_result r = tlsphi_sample_begin(&s, error);
+    if (!r) r = tlsphi_sample_store(&s, cloud, error);
+    tlsphi_plan_release(&s.v.plan);
+    return r;
+}
+
 /* ==== [PREFLIGHT] ================================================================================================== */
 
 TLSPHI_DEF const char *tlsph_hint_text(tlsph_hint hint) {
@@ -7938,6 +8705,7 @@ static int tlsphi_inside(const tlsph_fill *f, const double X[3]) {
         return !(X[0] > (double)f->origin[0] + (double)f->notch[0] &&
                  X[1] > (double)f->origin[1] + (double)f->notch[1]);
     case TLSPH_PREDICATE: return f->inside(f->inside_user, at);
+    case TLSPH_DISTANCE: return f->distance(f->distance_user, at) < 0;
     case TLSPH_CYLINDER:
     case TLSPH_SPHERE:
         for (int i = 0; i < f->dimension; i++) {
@@ -8048,13 +8816,6 @@ static void tlsphi_fill_cell(tlsphi_lattice *l, const size_t c[3], void *arg) {
     t->cell++;
 }
 
-/* splitmix64: the same jitter everywhere for the same seed. */
-static double tlsphi_random(uint64_t *state) {
-    uint64_t z = *state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return (double)((z ^ z >> 31) >> 11) / 9007199254740992.0;
-}
 /* The faces between cells of the body and others, as segments or triangles; with out == NULL only counts them. */
 typedef struct tlsphi_faces {
     tlsph_real *out;
@@ -8106,13 +8867,16 @@ static tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const c
 }
 static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
     if (f->cookie != TLSPHI_COOKIE || f->dimension < 2 || f->dimension > 3 ||
-        (unsigned)f->shape > (unsigned)TLSPH_PREDICATE || (unsigned)f->placement > (unsigned)TLSPH_CELL_CENTRED ||
-        (f->shape == TLSPH_PREDICATE && !f->inside) || f->axis < 0 || f->axis > 2)
+        (unsigned)f->shape > (unsigned)TLSPH_TRIANGLES || (unsigned)f->placement > (unsigned)TLSPH_SCATTERED ||
+        (f->shape == TLSPH_PREDICATE && (!f->inside || f->placement == TLSPH_SCATTERED)) ||
+        (f->shape == TLSPH_DISTANCE && !f->distance) ||
+        (f->shape == TLSPH_TRIANGLES && (!f->surface.count || f->placement != TLSPH_SCATTERED)) || f->axis < 0 || f->axis > 2)
         return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "cookie, dimension, shape, placement, axis or inside",
                                 f->dimension, "what tlsph_fill_default sets");
     if (!tlsphi_all_finite(f->origin, 3) || !tlsphi_all_finite(f->size, 3) || !tlsphi_finite(f->spacing))
         return tlsphi_fill_fail(error, TLSPH_ERROR_NOT_FINITE, "origin, size or spacing", (double)f->spacing, "finite");
     for (int i = 0; i < f->dimension; i++) {
+        if (f->shape == TLSPH_TRIANGLES && f->spacing > 0) continue;
         if (!(f->size[i] > 0))
             return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "size", (double)f->size[i], "more than 0");
         if (!(f->spacing > 0) || !((double)f->size[i] / (double)f->spacing < TLSPHI_LINES - 2))
@@ -8160,7 +8924,7 @@ static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
                         : tlsphi_fill_fail(error, TLSPH_ERROR_SIZE, "particles", 0, "at least 1; refine the spacing");
 }
 /* Boxes and L-shapes take their few large faces, all else the faces of the lattice's cells. */
-static tlsph_result tlsphi_cloud_voronoi(tlsphi_lattice *l, const tlsph_cloud *cloud, tlsph_real *volumes,
+static tlsph_result tlsphi_cloud_voronoi(tlsphi_lattice *l, tlsph_cloud *cloud, tlsph_real *volumes,
                                          tlsph_real *areas, tlsph_error *error) {
     const int plain = l->fill->shape == TLSPH_BOX || l->fill->shape == TLSPH_L_SHAPE;
     tlsph_fill coarse = *l->fill;
@@ -8183,7 +8947,8 @@ static tlsph_result tlsphi_cloud_voronoi(tlsphi_lattice *l, const tlsph_cloud *c
     surface.corners = faces.out;
     faces.count = 0;
     if (!r) tlsphi_each_cell(from, 0, tlsphi_cell_faces, &faces);
-    if (!r) r = tlsph_voronoi(coarse.dimension, &cloud->particles, &surface, &l->allocator, volumes, areas, error);
+    if (!r && l->fill->placement == TLSPH_SCATTERED) r = tlsphi_cloud_scatter(l->fill, &surface, cloud, error);
+    else if (!r) r = tlsph_voronoi(coarse.dimension, &cloud->particles, &surface, &l->allocator, volumes, areas, error);
     if (faces.out) l->allocator.release(l->allocator.user, faces.out, bytes);
     if (few.memory) few.allocator.release(few.allocator.user, few.memory, few.memory_size);
     return r;
@@ -8244,8 +9009,11 @@ TLSPHI_DEF tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *
     memset(&l, 0, sizeof l);
     l.fill = fill;
     l.allocator = tlsphi_allocator(&fill->allocator);
-    r = tlsphi_lattice_make(&l, error);
-    if (!r) r = tlsphi_cloud_fill(&l, cloud, error);
+    if (fill->placement != TLSPH_SCATTERED) {
+        r = tlsphi_lattice_make(&l, error);
+        if (!r) r = tlsphi_cloud_fill(&l, cloud, error);
+    } else if (fill->shape == TLSPH_BOX || fill->shape == TLSPH_L_SHAPE) r = tlsphi_cloud_voronoi(&l, cloud, NULL, NULL, error);
+    else r = tlsphi_cloud_scatter(fill, NULL, cloud, error);
     if (r) tlsph_cloud_destroy(cloud);
     if (l.memory) l.allocator.release(l.allocator.user, l.memory, l.memory_size);
     return r;

@@ -101,4 +101,7 @@ typedef struct driver_panel { const char *title, *y_label; } driver_panel;
 int driver_overlay(driver *d, const char *file, const driver_history *const *histories, const char *const *names,
                    int count, const driver_panel *panels, int panel_count);
 
+/* The whole program of an example that lets a free body swing in an exact mode (mode_driver.c). */
+int driver_cloud_mode(int argc, char **argv, const char *name, const char *summary, cloud_mode_parameters *p);
+
 #endif

@@ -782,4 +782,36 @@ tlsph_result satellite_create(const satellite_parameters *parameters, satellite 
    antisymmetric operators and the limited dissipation, without projection's rigid motion. */
 tlsph_result satellite_resultants(const satellite *out, double force[3], double dissipation[3], double size[2]);
 
+/* ---- breathing ball and Lame's mode of a cube: free surfaces on irregular clouds --------------------------------- */
+
+typedef struct cloud_mode_parameters {
+    scene_options options;
+    int ball;             /* 1: ball of radius 1 m; 0: cube of 1 m */
+    int n;                /* spacings a radius, a side */
+    double jitter;        /* cube: share of the spacing by which a lattice's particles are moved; 0: the lattice */
+    int scattered;        /* cube: 1: a sampled cloud instead of a moved lattice */
+    int seed;
+    double amplitude;     /* m */
+    double young, poisson, density;
+    double periods;       /* over which the frequency is measured */
+} cloud_mode_parameters;
+
+typedef struct cloud_mode {
+    scene_body body;
+    cloud_mode_parameters parameters;
+    double k, omega;      /* 1/m, rad/s */
+} cloud_mode;
+
+void breathing_ball_default(cloud_mode_parameters *parameters);
+void lame_mode_default(cloud_mode_parameters *parameters);
+tlsph_result cloud_mode_create(const cloud_mode_parameters *parameters, cloud_mode *out, tlsph_error *error);
+void cloud_mode_exact(const cloud_mode *mode, const tlsph_real X[3], double t, double v[3], double F[9], double P[9]);
+double cloud_mode_period(const cloud_mode *mode);
+/* Amplitude of the velocity along the mode now, m/s. */
+double cloud_mode_amplitude(const cloud_mode *mode);
+/* Relative L2 errors of p and P now, all components. */
+void cloud_mode_errors(const cloud_mode *mode, double *error_p, double *error_P);
+/* Runs for the periods and fits the frequency: its relative error. `step` is called 64 times; it may be NULL. */
+tlsph_result cloud_mode_measure(cloud_mode *mode, double *frequency_error, void (*step)(void *user), void *user);
+
 #endif
