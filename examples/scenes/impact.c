@@ -47,8 +47,8 @@ tlsph_result impact_create(const impact_parameters *p, impact *out, tlsph_error 
 
 /* Behind the shock the body rests, so that all of the kinetic energy has become internal energy e = rho v^2/2; mass and
    momentum across the shock, which runs at W = v/(1 - J) in the reference, ask for P_XX = -rho v W. With the
-   temperature from e(J, theta) the compression J is what remains to be found. Returns the excess of -P_XX over rho v W.
- */
+   temperature from e(J, theta) the compression J is what remains to be found. Returns the excess of -P_XX over
+   rho v W. */
 static double rankine_hugoniot(const impact_parameters *p, double J, impact_star *star) {
     const tlsph_material *m = &p->material;
     const double rho = (double)m->density, theta_R = (double)m->reference_temperature;
