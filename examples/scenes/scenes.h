@@ -710,6 +710,25 @@ typedef struct spherical_ball {
 
 void spherical_ball_default(spherical_ball_parameters *parameters);
 tlsph_result spherical_ball_create(const spherical_ball_parameters *parameters, spherical_ball *out, tlsph_error *error);
+/* ---- stent: 001 section 7.3.2 ------------------------------------------------------------------------------------ */
+
+typedef struct stent_parameters {
+    scene_options options;
+    double spacing;       /* m */
+    int around, rows;     /* holes on the whole circumference (a multiple of 4), rows of them on half the length */
+    double young, density, nu;
+    double start_time;    /* s, of the paper's clock, at which the run starts: before 0.006 s the end moves by 5 um */
+} stent_parameters;
+
+typedef struct stent { scene_body body; stent_parameters parameters; } stent;
+
+void stent_default(stent_parameters *parameters);
+tlsph_result stent_create(const stent_parameters *parameters, stent *out, tlsph_error *error);
+/* Speed (m/s) and way (m) of the end towards the middle at the paper's time t, (60); exact volume of the eighth (m^3), holes taken as drilled
+   straight through the middle surface. */
+double stent_speed(double t);
+double stent_shortening(double t);
+double stent_volume(const stent_parameters *parameters);
 
 /* ---- Taylor bar: 001 section 7.2.3, table 2 ---------------------------------------------------------------------- */
 
