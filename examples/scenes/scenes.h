@@ -717,7 +717,7 @@ typedef struct stent_parameters {
     double spacing;       /* m */
     int around, rows;     /* holes on the whole circumference (a multiple of 4), rows of them on half the length */
     double young, density, nu;
-    double start_time;    /* s, of the paper's clock, at which the run starts: before 0.006 s the end moves by 5 um */
+    double start_time;    /* s, of the paper's clock, at which the run starts: before 0.008 s the end moves by 22 um */
 } stent_parameters;
 
 typedef struct stent { scene_body body; stent_parameters parameters; } stent;

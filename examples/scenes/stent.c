@@ -19,7 +19,7 @@ void stent_default(stent_parameters *p) {
     scene_options_default(&p->options);
     p->options.end_time = 0.0216; /* figure 29 */
     p->options.cfl = 0.4;
-    p->start_time = 0.006;
+    p->start_time = 0.008;
     p->spacing = 0.0005;          /* two particles across the wall, the least that the paper speaks of */
     p->around = 16;
     p->rows = 3;
