@@ -334,6 +334,26 @@ tlsph_result twisting_column_create(const twisting_column_parameters *parameters
 /* Brings *shape (zero before the first reading) up to date; call it after each step, so that no turn is missed. */
 void twisting_column_read(const twisting_column *column, twisting_column_shape *shape);
 
+/* ---- stent: 001 section 7.3.2 ------------------------------------------------------------------------------------ */
+
+typedef struct stent_parameters {
+    scene_options options;
+    double spacing;       /* m */
+    int around, rows;     /* holes on the whole circumference (a multiple of 4), rows of them on half the length */
+    double young, density, nu;
+    double start_time;    /* s, of the paper's clock, at which the run starts: before 0.008 s the end moves by 22 um */
+} stent_parameters;
+
+typedef struct stent { scene_body body; stent_parameters parameters; } stent;
+
+void stent_default(stent_parameters *parameters);
+tlsph_result stent_create(const stent_parameters *parameters, stent *out, tlsph_error *error);
+/* Speed (m/s) and way (m) of the end towards the middle at the paper's time t, (60); exact volume of the eighth (m^3), holes
+   taken as drilled straight through the middle surface. */
+double stent_speed(double t);
+double stent_shortening(double t);
+double stent_volume(const stent_parameters *parameters);
+
 /* ---- rotating disk: 000 section 7.3 ------------------------------------------------------------------------------ */
 
 /* The figure with the sizes is missing. What the text gives: X = (2, 4, 0) m is watched, and 1591.5 W/m^2 acts on a quarter
@@ -710,25 +730,6 @@ typedef struct spherical_ball {
 
 void spherical_ball_default(spherical_ball_parameters *parameters);
 tlsph_result spherical_ball_create(const spherical_ball_parameters *parameters, spherical_ball *out, tlsph_error *error);
-/* ---- stent: 001 section 7.3.2 ------------------------------------------------------------------------------------ */
-
-typedef struct stent_parameters {
-    scene_options options;
-    double spacing;       /* m */
-    int around, rows;     /* holes on the whole circumference (a multiple of 4), rows of them on half the length */
-    double young, density, nu;
-    double start_time;    /* s, of the paper's clock, at which the run starts: before 0.008 s the end moves by 22 um */
-} stent_parameters;
-
-typedef struct stent { scene_body body; stent_parameters parameters; } stent;
-
-void stent_default(stent_parameters *parameters);
-tlsph_result stent_create(const stent_parameters *parameters, stent *out, tlsph_error *error);
-/* Speed (m/s) and way (m) of the end towards the middle at the paper's time t, (60); exact volume of the eighth (m^3), holes taken as drilled
-   straight through the middle surface. */
-double stent_speed(double t);
-double stent_shortening(double t);
-double stent_volume(const stent_parameters *parameters);
 
 /* ---- Taylor bar: 001 section 7.2.3, table 2 ---------------------------------------------------------------------- */
 
