@@ -3584,8 +3584,9 @@ static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block) {
     4 /* measured on symmetric impacts at 0.1 and 0.3 c_p: overshoot 2 to 3 %, 25 to 45 % without */
 
 /* By symmetry a raw jump may be 0 but for round-off where Dr is not: were its sign asked then, chance would switch the
-   dissipation and a symmetric body lose its symmetry. So a raw jump below this share of Dr counts as 0. */
-#define TLSPHI_LIMITER_FLOOR TLSPHI_R(TLSPHI_EPSILON > 1e-10 ? 3e-4 : 1e-8)
+   dissipation and a symmetric body lose its symmetry. So a raw jump below this share of Dr counts as 0; near incompressibility
+   the round-off of Sigma_J is large, and 1e-8 was too little for a twisting column. */
+#define TLSPHI_LIMITER_FLOOR TLSPHI_R(TLSPHI_EPSILON > 1e-10 ? 3e-4 : 1e-6)
 
 /* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; front in [0, 1] gives the normal part
    of the raw jump back. */
