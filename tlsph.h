@@ -3796,18 +3796,14 @@ static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
     s->rate_J[a] = tlsphi_dot(s->dim * s->dim, H, s->rate_F + D * D * a);
 }
 
-/* One instance for each combination that a scene may have: the pair loop itself has no branch. */
+/* One instance with and without w, which most of the cost hangs on, and with and without scalars. */
 TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, const int dim, int with_w, int with_S,
                                             int with_theta) {
-    switch ((with_w ? 4 : 0) + (with_S ? 2 : 0) + (with_theta ? 1 : 0)) {
+    switch ((with_w ? 2 : 0) + (with_S || with_theta ? 1 : 0)) {
     case 0: tlsphi_gradient_particle(s, a, dim, 0, 0, 0); break;
-    case 1: tlsphi_gradient_particle(s, a, dim, 0, 0, 1); break;
-    case 2: tlsphi_gradient_particle(s, a, dim, 0, 1, 0); break;
-    case 3: tlsphi_gradient_particle(s, a, dim, 0, 1, 1); break;
-    case 4: tlsphi_gradient_particle(s, a, dim, 1, 0, 0); break;
-    case 5: tlsphi_gradient_particle(s, a, dim, 1, 0, 1); break;
-    case 6: tlsphi_gradient_particle(s, a, dim, 1, 1, 0); break;
-    default: tlsphi_gradient_particle(s, a, dim, 1, 1, 1); break;
+    case 1: tlsphi_gradient_particle(s, a, dim, 0, with_S, with_theta); break;
+    case 2: tlsphi_gradient_particle(s, a, dim, 1, 0, 0); break;
+    default: tlsphi_gradient_particle(s, a, dim, 1, with_S, with_theta); break;
     }
 }
 /* The odd part of a vector across an image's mirror; the image's share in grad v (for w it is the same, because the rigid
@@ -4229,26 +4225,18 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
 
 TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const int dim, const int with_J,
                                      const int thermal, const int plain) {
+    const int first = s->parted ? TLSPHI_STRESSES : TLSPHI_BOTH, passes = s->parted && (!s->frozen || s->damps) ? 2 : 1;
     for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_gathered sum;
-        memset(&sum, 0, sizeof sum);
-        sum.least = TLSPHI_LARGEST;
-        if (!s->parted) {
-            tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_BOTH, &sum);
-        } else {
-            tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_STRESSES, &sum);
-            if (!s->frozen || s->damps) {
-                tlsphi_gathered damping;
-                memset(&damping, 0, sizeof damping);
-                damping.least = TLSPHI_LARGEST;
-                tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, TLSPHI_DAMPING, &damping);
-                if (s->frozen) tlsphi_keep_damping(s, a, dim, &damping);
-                else tlsphi_add_gathered(&sum, &damping);
-                sum.least = damping.least;
-            }
-            if (s->frozen) tlsphi_add_damping(s, a, dim, &sum);
-        }
-        tlsphi_flux_store(s, a, &sum, block->sums);
+        tlsphi_gathered part[2]; /* all, or stresses and damping apart */
+        memset(part, 0, sizeof part);
+        part[0].least = part[1].least = TLSPHI_LARGEST;
+        for (int k = 0; k < passes; k++) /* one place, so that it is compiled once */
+            tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, k ? TLSPHI_DAMPING : first, &part[k]);
+        if (passes == 2 && s->frozen) tlsphi_keep_damping(s, a, dim, &part[1]);
+        if (passes == 2 && !s->frozen) tlsphi_add_gathered(&part[0], &part[1]);
+        part[0].least = tlsphi_dmin(part[0].least, part[1].least);
+        if (s->frozen) tlsphi_add_damping(s, a, dim, &part[0]);
+        tlsphi_flux_store(s, a, &part[0], block->sums);
     }
 }
 #define TLSPHI_FLUX(dim, J, thermal)                                                                                   \
