@@ -2219,16 +2219,18 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
      B_a -> B_a + s0 s_a l_a,  s_a,i = 0.01 n_i^2;    V_a I -> V_a I - s0 eps h^2 (m_a - start),  eps = 1e-3 (V_a/h^D)^2
 
    s0 = sum_b w. The volumes' slack leaves gradients of linear fields wrong by up to 2 % in a few particles, 0.2 % on average.
-   Where that is too much (`tight_closure`), a second, better conditioned solution starts from the first, with the new B_a: it
-   takes the slack of the volumes away and holds l instead, s0 (l_a - first l_a)/10000. It costs as much again, and waves are
-   not the better for it. What the iterations leave of sum C + B is at last taken away by l alone, a graph's Laplacian, so
-   that inside the body a uniform stress exerts no force but round-off.
+   Where that is too much (`tight_closure`, or more than 5 % anywhere), a second, better conditioned solution starts
+   from the first, with the new B_a: it takes the slack of the volumes away and holds l instead, s0 (l_a - first
+   l_a)/10000. It costs as much again, and waves are not the better for it. What the iterations leave of sum C + B
+   is at last taken away by l alone, a graph's Laplacian, so that inside the body a uniform stress exerts no force
+   but round-off.
    Conjugate gradients, one for each component, all in one sweep over the pairs; preconditioner: the inverse of each
    particle's own (1 + D) x (1 + D) block. In units of the largest spacing. */
 
 #define TLSPHI_CLOSURE_SLACK 1e-3  /* eps */
 #define TLSPHI_CLOSURE_AREA 0.01   /* s_a along n */
 #define TLSPHI_CLOSURE_LIMIT 1e-3  /* largest residual of the first solution, in the local spacing's area and volume */
+#define TLSPHI_CLOSURE_DEFECT 0.05 /* of linear fields in any particle, above which the second solution is made */
 #define TLSPHI_CLOSURE_HOLD 1e-4   /* second solution: slack of l, */
 #define TLSPHI_CLOSURE_REST 1e-6   /* what is left of the volumes' slack, */
 #define TLSPHI_CLOSURE_TIGHT 1e-4  /* largest residual */
@@ -2506,6 +2508,22 @@ static tlsph_result tlsphi_closure_start(tlsphi_closer *c) {
     memcpy(c->x, c->p, c->n * c->width * sizeof *c->x);
     return TLSPH_OK;
 }
+/* What the volumes' slack has taken from linear fields, in the worst particle. */
+static double tlsphi_closure_defect(tlsphi_closer *c) {
+    const size_t D = (size_t)c->plan->dim, rows = c->rows;
+    const double volume = pow(c->unit, (double)D);
+    double worst = 0;
+    for (size_t i = 0; i < c->n; i++) {
+        const double V = tlsphi_plan_volume(c->plan, c->plan->grid.order[i]) / volume;
+        double m[9];
+        tlsphi_closure_particle(c, i, m); /* the start once more */
+        for (size_t j = 0; j < D * D; j++) {
+            const size_t at = c->width * i + rows * (j / D) + 1 + j % D;
+            worst = tlsphi_dmax(worst, c->slack[rows * i + D] * fabs(c->x[at] - m[j] / volume) / (2 * V));
+        }
+    }
+    return worst;
+}
 /* From the first solution to the second: what slack there was is residual now. */
 static tlsph_result tlsphi_closure_tighten(tlsphi_closer *c) {
     const size_t D = (size_t)c->plan->dim, rows = c->rows;
@@ -2602,7 +2620,7 @@ static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, ui
     if ((r = tlsphi_closure_lists(c, sorted, parent, list, g)) || (r = tlsphi_closure_parts(c, parent, c->p)) ||
         (r = tlsphi_closure_start(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_LIMIT)))
         return r;
-    if (plan->desc->tight_closure &&
+    if ((plan->desc->tight_closure || tlsphi_closure_defect(c) > TLSPHI_CLOSURE_DEFECT) &&
         ((r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_TIGHT))))
         return r;
     c->balances = 1;
