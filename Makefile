@@ -1,6 +1,6 @@
 # GNU make. Needs cc and make only; everything else (OpenMP, clang, C++, valgrind, nm) is looked for and used if present.
 #
-#   make            examples -> build/<example>         make test    unit and physics tests, about 2 minutes
+#   make            examples -> build/<example>         make test    unit and physics tests, about 4 minutes
 #   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
 #   make bench      timings                             make coverage, make clean
 #   make portability    the tests with other compilers, C libraries, machines and systems, as far as installed
