@@ -44,19 +44,7 @@ static void after_step(driver *d) {
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 static ex_view make_view(const char *label, const char *heading, ex_map map, double azimuth, double elevation) {
-    ex_view view;
-    memset(&view, 0, sizeof view);
-    view.panel_width = 420;
-    view.panel_height = 340;
-    view.camera.azimuth = azimuth;
-    view.camera.elevation = elevation;
-    view.camera.up_axis = 2;
-    view.camera.zoom = 1;
-    view.map = map;
-    view.label = label;
-    view.heading = heading;
-    view.common_scale = 1;
-    return view;
+    return driver_view(420, 340, azimuth, elevation, 2, map, label, heading);
 }
 
 static void draw(run *r) {

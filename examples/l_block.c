@@ -133,19 +133,8 @@ static void simulate(run *r) {
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 static ex_view make_view(const char *label, const char *heading, ex_map map) {
-    ex_view view;
-    memset(&view, 0, sizeof view);
-    view.panel_width = 380;
-    view.panel_height = 460;
-    view.camera.azimuth = 30; /* from the front, with the cold face X = 6 m in sight */
-    view.camera.elevation = 15;
-    view.camera.up_axis = 1;
-    view.camera.zoom = 1;
-    view.map = map;
-    view.label = label;
-    view.heading = heading;
-    view.common_scale = 1;
-    return view;
+    /* from the front, with the cold face X = 6 m in sight */
+    return driver_view(380, 460, 30, 15, 1, map, label, heading);
 }
 
 static const char pressure_label[] = "pressure [kPa], tension positive", temperature_label[] = "temperature [K]";

@@ -96,19 +96,7 @@ static tlsph_result run_other(run *r, int unknowns, int thermal, driver_history 
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 static ex_view make_view(const char *label, const char *heading, ex_map map, double elevation) {
-    ex_view view;
-    memset(&view, 0, sizeof view);
-    view.panel_width = 330;
-    view.panel_height = 300;
-    view.camera.azimuth = elevation > 80 ? -90 : 35;
-    view.camera.elevation = elevation;
-    view.camera.up_axis = 2;
-    view.camera.zoom = 1;
-    view.map = map;
-    view.label = label;
-    view.heading = heading;
-    view.common_scale = 1;
-    return view;
+    return driver_view(330, 300, elevation > 80 ? -90 : 35, elevation, 2, map, label, heading);
 }
 
 static const char pressure_label[] = "pressure [kPa], tension positive", temperature_label[] = "temperature [K]";

@@ -96,19 +96,8 @@ static void after_step(driver *d) {
 /* ---- pictures ---------------------------------------------------------------------------------------------------- */
 
 static ex_view make_view(const char *label, const char *heading, ex_map map) {
-    ex_view view;
-    memset(&view, 0, sizeof view);
-    view.panel_width = 400;
-    view.panel_height = 380;
-    view.camera.azimuth = 35; /* so that the heated quarter, X > 2 and Y > 2 m at the start, faces the viewer */
-    view.camera.elevation = 35;
-    view.camera.up_axis = 2;
-    view.camera.zoom = 1;
-    view.map = map;
-    view.label = label;
-    view.heading = heading;
-    view.common_scale = 1;
-    return view;
+    /* so that the heated quarter, X > 2 and Y > 2 m at the start, faces the viewer */
+    return driver_view(400, 380, 35, 35, 2, map, label, heading);
 }
 
 static const char pressure_label[] = "pressure [Pa], tension positive", temperature_label[] = "temperature [K]";

@@ -58,19 +58,7 @@ static void after_step(driver *d) {
 }
 
 static ex_view make_view(const char *label, const char *heading, ex_map map) {
-    ex_view view;
-    memset(&view, 0, sizeof view);
-    view.panel_width = 380;
-    view.panel_height = 360;
-    view.camera.azimuth = 35;
-    view.camera.elevation = 30;
-    view.camera.up_axis = 2;
-    view.camera.zoom = 1;
-    view.map = map;
-    view.label = label;
-    view.heading = heading;
-    view.common_scale = 1;
-    return view;
+    return driver_view(380, 360, 35, 30, 2, map, label, heading);
 }
 
 static void draw(run *r) {

@@ -169,7 +169,7 @@ static void check_operator(const tlsph_operator *o, double linear)
             }
         }
     CHECK(worst <= 4 * EPSILON * largest);
-    CHECK_BELOW(linear, 0.1);
+    CHECK_BELOW(linear, 0.055); /* above 5 % a second solution is made */
 }
 
 TEST(closed_antisymmetric_exact)

@@ -89,8 +89,8 @@ static void second_order(tlsph_material_kind kind, int demanding, tlsph_thermal 
     CHECK(o.p >= least);
     CHECK(o.P >= least);
     CHECK(o.theta >= least);
-    /* at large strain small shear components are still on their way to order 2: 0.9 to 1.9, reported, not asked for */
-    CHECK(demanding || o.worst >= least - 0.1); /* the small components P_yZ, P_zY come last */
+    /* at large strain small shear components are still on their way to order 2: 1.26 at least */
+    CHECK(o.worst >= (demanding ? 1.2 : least - 0.1)); /* the small components P_yZ, P_zY come last */
 }
 
 static const int paper_n[3] = { 8, 12, 16 }, large_n[3] = { 8, 10, 12 }, fine_n[3] = { 8, 12, 16 };

@@ -200,6 +200,23 @@ void driver_snapshot_free(driver_snapshot *s) {
     memset(s, 0, sizeof *s);
 }
 
+ex_view driver_view(int width, int height, double azimuth, double elevation, int up_axis, ex_map map, const char *label,
+                    const char *heading) {
+    ex_view view;
+    memset(&view, 0, sizeof view);
+    view.panel_width = width;
+    view.panel_height = height;
+    view.camera.azimuth = azimuth;
+    view.camera.elevation = elevation;
+    view.camera.up_axis = up_axis;
+    view.camera.zoom = 1;
+    view.map = map;
+    view.label = label;
+    view.heading = heading;
+    view.common_scale = 1;
+    return view;
+}
+
 int driver_render(driver *d, const char *file, const ex_view *view, const driver_snapshot *snapshots, int count,
                   int columns, double radius) {
     ex_panel *panels = calloc((size_t)count + 1, sizeof *panels);

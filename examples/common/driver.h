@@ -60,6 +60,9 @@ typedef struct driver_snapshot {
 /* Keeps one component of a field now, times `scale` (kPa from Pa, for instance). 0 on success. */
 int driver_snap(const scene_body *body, tlsph_field field, int component, double scale, driver_snapshot *out);
 void driver_snapshot_free(driver_snapshot *snapshot);
+/* A view of panels of width x height pixels with one colour scale; angles in degrees. */
+ex_view driver_view(int width, int height, double azimuth, double elevation, int up_axis, ex_map map, const char *label,
+                    const char *heading);
 /* Renders snapshots as panels of stretched particles with half-edge `radius`; empty snapshots are left out. The view's
    sizes, colours and texts are the caller's. 0 on success. */
 int driver_render(driver *d, const char *file, const ex_view *view, const driver_snapshot *snapshots, int count,

@@ -53,7 +53,7 @@ static void report_closure(const tlsph_solver *solver) {
     ex_result("closure_change", closure.change_mean, "1");
 }
 
-/* Frequency errors on clouds fall with n^2: 3.2, 0.8 % (ball), 2.5, 0.6 % (cube, n = 8, 16) and a quarter more. */
+/* Frequency errors on clouds fall with n^2: 3.2, 1.4, 0.8 % (ball, n = 4, 6, 8), 6.5, 2.5 % (cube, n = 4, 8), and a quarter more. */
 static int run_mode(const char *name, const cloud_mode_parameters *p) {
     static run r;
     tlsph_error error;
