@@ -1357,16 +1357,28 @@ typedef struct tlsphi_plan {
 } tlsphi_plan;
 
 static void *tlsphi_scratch_take(tlsphi_plan *plan, size_t count, size_t size) {
+    if (count > SIZE_MAX / 4 / size) return NULL;
     const size_t bytes = count * size + (count == 0);
-    if (size && count > SIZE_MAX / 4 / size) return NULL;
     void *memory = plan->allocator.allocate(plan->allocator.user, bytes);
     if (!memory) return NULL;
+    TLSPH_ASSERT((size_t)plan->scratches < sizeof plan->scratch / sizeof *plan->scratch);
     memset(memory, 0, bytes);
     plan->scratch[plan->scratches].memory = memory;
     plan->scratch[plan->scratches++].size = bytes;
     return memory;
 }
 #define TLSPHI_SCRATCH(plan, type, count) ((type *)tlsphi_scratch_take((plan), (count), sizeof(type)))
+/* A longer copy of an array (NULL: a new one), which is given back itself. */
+static void *tlsphi_scratch_grow(tlsphi_plan *plan, void *old, size_t from, size_t to, size_t size) {
+    int i = 0;
+    void *memory = tlsphi_scratch_take(plan, to, size);
+    if (!memory || !old) return memory;
+    memcpy(memory, old, from * size);
+    while (plan->scratch[i].memory != old) i++;
+    plan->allocator.release(plan->allocator.user, old, plan->scratch[i].size);
+    plan->scratch[i] = plan->scratch[--plan->scratches];
+    return memory;
+}
 
 static void tlsphi_plan_release(tlsphi_plan *plan) {
     while (plan->scratches > 0) {
@@ -1777,7 +1789,7 @@ static tlsph_result tlsphi_grid_build(tlsphi_plan *plan) {
         }
         grid->low[i] -= 1.5 * grid->width; /* so that cell - 1 never wraps below zero */
         const double cells = (high[i] - grid->low[i]) / grid->width + 2;
-        if (cells > (double)(1 << TLSPHI_GRID_BITS))
+        if (!tlsphi_finite((tlsph_real)cells) || cells > (double)(1 << TLSPHI_GRID_BITS))
             return tlsphi_plan_fail(plan, TLSPH_ERROR_SIZE, "extent / support radius", TLSPH_NO_PARTICLE, cells,
                                     (double)(1 << TLSPHI_GRID_BITS), "less than 2^21; check spacing and positions");
     }
@@ -6033,17 +6045,25 @@ TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_
     const tlsph_result result = tlsphi_check_checkpoint(s, at, size);
     if (result) return result;
     at += 24;
-    s->time = tlsphi_get_double(&at);
-    s->step = tlsphi_get(&at, 8);
-    s->first_dt = tlsphi_get_double(&at);
-    s->last_dt = tlsphi_get_double(&at);
+    const double time = tlsphi_get_double(&at);
+    const uint64_t step = tlsphi_get(&at, 8);
+    const double first_dt = tlsphi_get_double(&at), last_dt = tlsphi_get_double(&at);
+    tlsphi_keep_state(s);
     for (size_t i = 0; i < TLSPHI_ACCOUNTS; i++) accounts[i] = tlsphi_get_double(&at);
     memcpy(&s->account, accounts, sizeof accounts);
     const int arrays = tlsphi_state_arrays(s, array, components);
     for (int k = 0; k < arrays; k++)
         for (size_t h = 0; h < s->n; h++)
             for (size_t i = 0; i < components[k]; i++) array[k][components[k] * s->inner[h] + i] = tlsphi_get_real(&at);
-    tlsphi_evaluate(s);
+    if (!tlsphi_finite((tlsph_real)time) || tlsphi_evaluate(s)) { /* a checksum can be forged */
+        tlsphi_restore_state(s);
+        return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "state", TLSPH_NO_PARTICLE, time, 0,
+                           "one that steps have led to");
+    }
+    s->time = time;
+    s->step = step;
+    s->first_dt = first_dt;
+    s->last_dt = last_dt;
     return TLSPH_OK;
 }
 
@@ -6102,6 +6122,8 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"particles.spacing", (double)d->particles.spacing, 0, TLSPHI_LARGEST, "0 (from the weights) or more"},
         {"material_count", (double)d->material_count, 1, 256, "1 to 256"},
         {"particles.count", (double)d->particles.count, 2, 4294967294.0, "2 to 2^32 - 2"},
+        {"particles.cell_count", (double)d->particles.cell_count, 0, (double)d->particles.count,
+         "fewer than particles: a lattice has more corners than cells"},
     };
     if (d->cookie == TLSPHI_COOKIE && !tlsphi_finite(d->particles.spacing))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "particles.spacing", TLSPH_NO_PARTICLE,
@@ -6189,9 +6211,9 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
     if (!tlsphi_all_finite(c->normal, 3) || !tlsphi_all_finite(c->value, 3) || !tlsphi_all_finite(c->point, 3))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "value, normal or point", TLSPH_NO_PARTICLE, 0, 0,
                                 "finite");
-    if (plane && !(NN > 0))
+    if ((plane && !(NN > 0)) || !tlsphi_finite(NN))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "normal", TLSPH_NO_PARTICLE, (double)NN, 0,
-                                "not zero for this kind");
+                                "a square that is finite, and not zero for this kind");
     if (c->kind == TLSPH_WALL && plan->desc->scheme == TLSPH_INCOMPRESSIBLE)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
                                 "no walls with TLSPH_INCOMPRESSIBLE");
@@ -7664,7 +7686,7 @@ static tlsph_result tlsphi_mesh_measure(tlsphi_mesh *m, tlsph_error *error) {
         for (int k = 0; k < m->dim; k++) moment[k] += part * sum[k] / (m->dim + 1);
     }
     for (int k = 0; k < 3; k++) m->centre[k] = m->low[k] + (k < m->dim ? moment[k] / m->volume : 0);
-    if (m->volume > 0) return TLSPH_OK;
+    if (m->volume > 0 && tlsphi_finite((tlsph_real)m->volume)) return TLSPH_OK;
     return tlsphi_surface_fail(error, "volume", m->low, m->volume, "more than 0: facets counter-clockwise from outside");
 }
 /* `plan` gives the scratch. */
@@ -7809,10 +7831,12 @@ static tlsph_result tlsphi_voronoi_begin(tlsphi_voronoi *v, const tlsphi_mesh *m
         least = tlsphi_dmin(a ? least : 1e300, (double)p->spacings[a]);
         most = tlsphi_dmax(a ? most : 0, (double)p->spacings[a]);
     }
-    v->plan.desc = desc;
     v->plan.dim = desc->dimension;
     v->plan.n = p->count;
     v->plan.h = tlsphi_dmin(1.3 * most, 2 * 1.3 * least); /* 2 h: width of the grid's cells */
+    if (!(most <= 4096 * least))
+        return tlsphi_plan_fail(&v->plan, TLSPH_ERROR_ARGUMENT, "largest local spacing", TLSPH_NO_PARTICLE, most,
+                                4096 * least, "4096 times the least, or less");
     const tlsph_result r = tlsphi_grid_build(&v->plan);
     if (r) return r;
     v->near_capacity = p->count < 65536 ? p->count : 65536;
@@ -7831,16 +7855,21 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
     tlsph_allocator none;
     tlsphi_no_error(error);
     if (!particles || !surface || !volumes || !areas || dimension < 2 || dimension > 3 || !particles->positions ||
-        !particles->count || !(particles->spacing > 0 || particles->spacings))
+        !particles->count || (double)particles->count > 4294967294.0 ||
+        !(particles->spacing > 0 || particles->spacings))
         return tlsphi_fail(error, TLSPH_ERROR_ARGUMENT, "voronoi", "an argument", TLSPH_NO_PARTICLE, dimension, 0,
                            "positions with a spacing, a surface, two arrays; dimension 2 or 3");
     memset(&none, 0, sizeof none);
     memset(&v, 0, sizeof v);
     desc = tlsph_desc_default(dimension);
     desc.particles = *particles;
+    desc.particles.volumes = desc.particles.weights = desc.particles.areas = NULL;
+    desc.particles.materials = NULL;
+    v.plan.desc = &desc;
     v.plan.error = error;
     v.plan.allocator = tlsphi_allocator(allocator ? allocator : &none);
-    tlsph_result r = tlsphi_mesh_make(&m, &v.plan, dimension, surface, error);
+    tlsph_result r = tlsphi_check_particles(&v.plan);
+    if (!r) r = tlsphi_mesh_make(&m, &v.plan, dimension, surface, error);
     if (!r) r = tlsphi_voronoi_begin(&v, &m, &desc);
     if (!r) r = tlsphi_voronoi_measure(&v, &m, volumes, areas, error);
     tlsphi_plan_release(&v.plan);
@@ -7857,6 +7886,7 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
 
 #define TLSPHI_SHARP 0.85   /* cosine: edges that bend more are features */
 #define TLSPHI_RELAXATIONS 12
+#define TLSPHI_LINES 4096   /* of a lattice, at most, per axis */
 
 /* splitmix64: the same jitter everywhere for the same seed. */
 static double tlsphi_random(uint64_t *state) {
@@ -8039,6 +8069,7 @@ static void tlsphi_contour_sweep(tlsphi_contour *c, int vertices) {
 static tlsph_result tlsphi_contour_make(tlsphi_plan *plan, const tlsph_fill *f, double spacing, tlsph_surface *surface) {
     tlsphi_contour c;
     size_t total = 1, i[3];
+    double places = 1;
     memset(&c, 0, sizeof c);
     c.fill = f;
     c.step = spacing / 2;
@@ -8046,7 +8077,9 @@ static tlsph_result tlsphi_contour_make(tlsphi_plan *plan, const tlsph_fill *f, 
         c.low[k] = (double)f->origin[k] - (2.3719 + 0.0413 * k) * c.step;
         c.nodes[k] = k < f->dimension ? (size_t)((double)f->size[k] / c.step + 6) : 1;
         total *= c.nodes[k];
+        places *= (double)c.nodes[k];
     }
+    if (!(places < (double)(SIZE_MAX / 256))) return tlsphi_no_memory(plan, 32 * places);
     c.phi = TLSPHI_SCRATCH(plan, tlsph_real, total);
     c.vertex = TLSPHI_SCRATCH(plan, tlsph_real, 3 * total);
     if (!c.phi || !c.vertex) return tlsphi_no_memory(plan, 32.0 * (double)total);
@@ -8090,7 +8123,7 @@ typedef struct tlsphi_sampler {
 static double tlsphi_local_spacing(const tlsph_fill *f, const double X[3]) {
     const tlsph_real at[3] = {(tlsph_real)X[0], (tlsph_real)X[1], (tlsph_real)X[2]};
     const double s = f->spacing_at ? (double)f->spacing_at(f->spacing_user, at) : (double)f->spacing;
-    return s > (double)f->spacing / 64 ? s : (double)f->spacing;
+    return s > (double)f->spacing / 64 && s < 64 * (double)f->spacing ? s : (double)f->spacing;
 }
 static void tlsphi_sample_cell(const tlsphi_sampler *s, const double X[3], size_t at[3]) {
     for (int k = 0; k < 3; k++)
@@ -8133,19 +8166,12 @@ static void tlsphi_sample_link(tlsphi_sampler *s, size_t a) {
 }
 static tlsph_result tlsphi_sample_add(tlsphi_sampler *s, const double X[3], int kind) {
     if (s->count == s->capacity) {
-        const size_t more = s->capacity ? 2 * s->capacity : 4096;
-        double *X2 = TLSPHI_SCRATCH(&s->v.plan, double, 3 * more);
-        uint8_t *kind2 = TLSPHI_SCRATCH(&s->v.plan, uint8_t, more);
-        uint32_t *next2 = TLSPHI_SCRATCH(&s->v.plan, uint32_t, more);
-        if (!X2 || !kind2 || !next2 || more > 1000000000u) return tlsphi_no_memory(&s->v.plan, 29.0 * (double)more);
-        if (s->count) {
-            memcpy(X2, s->X, 3 * s->count * sizeof *X2);
-            memcpy(kind2, s->kind, s->count);
-            memcpy(next2, s->next, s->count * sizeof *next2);
-        }
-        s->X = X2;
-        s->kind = kind2;
-        s->next = next2;
+        const size_t more = s->capacity ? 2 * s->capacity : 4096, n = s->count;
+        tlsphi_plan *plan = &s->v.plan;
+        s->X = (double *)tlsphi_scratch_grow(plan, s->X, 3 * n, 3 * more, sizeof *s->X);
+        s->kind = (uint8_t *)tlsphi_scratch_grow(plan, s->kind, n, more, 1);
+        s->next = (uint32_t *)tlsphi_scratch_grow(plan, s->next, n, more, sizeof *s->next);
+        if (!s->X || !s->kind || !s->next || more > 1000000000u) return tlsphi_no_memory(plan, 29.0 * (double)more);
         s->capacity = more;
     }
     memcpy(s->X + 3 * s->count, X, 3 * sizeof *X);
@@ -8370,6 +8396,7 @@ static tlsph_result tlsphi_sample_faces(tlsphi_sampler *s) {
         }
         sum[f + 1] = sum[f] + tlsphi_mesh_normal(m, f, n) / pow(tlsphi_local_spacing(s->fill, X), 2);
     }
+    if (!(30 * sum[m->facets] < 4e9)) return tlsphi_no_memory(&s->v.plan, 24 * sum[m->facets]);
     const size_t tries = (size_t)(30 * sum[m->facets]) + 64;
     size_t step = (size_t)(0.6180339887 * (double)tries) | 1, i = 0;
     for (size_t a = tries, b = step % tries; b || a != 1;) { /* make it coprime, so that every share of the area has its turn */
@@ -8468,12 +8495,22 @@ static void tlsphi_sample_relax(tlsphi_sampler *s) {
         for (size_t a = 0; a < s->count; a++) tlsphi_sample_link(s, a);
     }
 }
-static tlsph_result tlsphi_sample_begin(tlsphi_sampler *s, tlsph_error *error) {
-    const tlsph_fill *f = s->fill;
+/* f: s->fill, which gets the bounds of its triangles. */
+static tlsph_result tlsphi_sample_begin(tlsphi_sampler *s, tlsph_fill *f, tlsph_error *error) {
     tlsphi_plan *plan = &s->v.plan;
     double least = 1e300;
     tlsph_surface surface = f->surface;
     tlsph_result r;
+    if (f->shape == TLSPH_TRIANGLES) {
+        if ((r = tlsphi_mesh_make(&s->mesh, plan, f->dimension, &surface, error))) return r;
+        for (int k = 0; k < 3; k++) {
+            f->origin[k] = (tlsph_real)s->mesh.low[k];
+            f->size[k] = (tlsph_real)(s->mesh.high[k] - s->mesh.low[k]);
+            if (!(f->size[k] < TLSPHI_LINES * f->spacing))
+                return tlsphi_fail(error, TLSPH_ERROR_DESCRIPTION, "fill", "spacing", TLSPH_NO_PARTICLE,
+                                   (double)f->spacing, 0, "fewer than 4096 in the surface's bounds");
+        }
+    }
     for (int i = 0; i < 4096; i++) { /* the range of spacings, from a grid of 16^3 places */
         const int at[3] = {i % 16, i / 16 % 16, f->dimension == 3 ? i / 256 : 0};
         double X[3];
@@ -8482,8 +8519,9 @@ static tlsph_result tlsphi_sample_begin(tlsphi_sampler *s, tlsph_error *error) {
         least = tlsphi_dmin(least, h);
         s->largest = tlsphi_dmax(s->largest, h);
     }
-    if (f->shape != TLSPH_TRIANGLES && (r = tlsphi_contour_make(plan, f, least, &surface))) return r;
-    if ((r = tlsphi_mesh_make(&s->mesh, plan, f->dimension, &surface, error))) return r;
+    if (f->shape != TLSPH_TRIANGLES && ((r = tlsphi_contour_make(plan, f, least, &surface)) ||
+                                        (r = tlsphi_mesh_make(&s->mesh, plan, f->dimension, &surface, error))))
+        return r;
     if ((r = tlsphi_voronoi_bins(&s->v, &s->mesh, s->largest))) return r;
     size_t total = 1;
     s->bin = 1.5 * s->largest;
@@ -8548,21 +8586,11 @@ static tlsph_result tlsphi_cloud_scatter(const tlsph_fill *fill, const tlsph_sur
         copy.surface = *surface;
         copy.shape = TLSPH_TRIANGLES;
     }
-    for (int k = 0; k < 3 && copy.shape == TLSPH_TRIANGLES; k++) {
-        const size_t corners = copy.surface.count * (size_t)copy.dimension;
-        tlsph_real high = copy.surface.corners[k];
-        copy.origin[k] = high;
-        for (size_t i = 0; i < corners; i++) {
-            copy.origin[k] = tlsphi_min(copy.origin[k], copy.surface.corners[3 * i + (size_t)k]);
-            high = tlsphi_max(high, copy.surface.corners[3 * i + (size_t)k]);
-        }
-        copy.size[k] = high - copy.origin[k];
-    }
     s.fill = &copy;
     s.random = fill->seed;
     s.v.plan.error = error;
     s.v.plan.allocator = tlsphi_allocator(&fill->allocator);
-    tlsph_result r = tlsphi_sample_begin(&s, error);
+    tlsph_result r = tlsphi_sample_begin(&s, &copy, error);
     if (!r) r = tlsphi_sample_store(&s, cloud, error);
     tlsphi_plan_release(&s.v.plan);
     return r;
@@ -8688,8 +8716,6 @@ TLSPHI_DEF void tlsph_preflight(const tlsph_solver *s, tlsph_real end_time, tlsp
    A lattice of cells over the shape's box. A cell belongs to the body if its centre does. On-face particles sit at the
    corners of cells with an eighth (2-D: a quarter) of each cell around them; cell-centred ones in the middle. The lines
    of the lattice are spaced per segment, so that the notch of an L lies on a line. */
-
-#define TLSPHI_LINES 4096 /* at most, per axis */
 
 typedef struct tlsphi_lattice {
     const tlsph_fill *fill;
@@ -8904,12 +8930,17 @@ static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
 static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
     tlsphi_arena arena;
     size_t cells = 1, lines = 1;
+    double places = 1;
     for (int i = 0; i < 3; i++) {
         l->cells[i] = i < l->fill->dimension ? tlsphi_axis_lines(l->fill, i, NULL) : 1;
         l->lines[i] = i < l->fill->dimension ? l->cells[i] + 1 : 1;
         cells *= l->cells[i];
         lines *= l->lines[i];
+        places *= (double)l->lines[i];
     }
+    if (!(places < 4294967295.0 && places < (double)(SIZE_MAX / 4)))
+        return tlsphi_fill_fail(error, TLSPH_ERROR_SIZE, "places of the lattice", places,
+                                "less than 2^32 (32-bit machines: 2^30); take a larger spacing");
     memset(&arena, 0, sizeof arena);
     for (int pass = 0; pass < 2; pass++) {
         arena.used = 0;
@@ -8918,7 +8949,7 @@ static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
         l->number = TLSPHI_TAKE(&arena, uint32_t, lines);
         if (pass) break;
         l->memory_size = arena.size = arena.used;
-        l->memory = lines < 4294967295u ? l->allocator.allocate(l->allocator.user, l->memory_size) : NULL;
+        l->memory = l->allocator.allocate(l->allocator.user, l->memory_size);
         if (!l->memory)
             return tlsphi_fill_fail(error, TLSPH_ERROR_MEMORY, "bytes", (double)l->memory_size,
                                     "what the allocator can give");
