@@ -1551,9 +1551,10 @@ typedef struct tlsphi_stencil {
 
 static double tlsphi_line_weight(const tlsphi_interval *line, uint32_t i) {
     static const double H[4] = {17. / 48, 59. / 48, 43. / 48, 49. / 48};
-    const uint32_t n = line->end - line->begin, side = 2 * i > n, from_end = side ? n - i : i;
-    if (!line->fourth || line->mirror[side]) return from_end ? 1 : 0.5;
-    return from_end < 4 ? H[from_end] : 1;
+    const uint32_t from_end[2] = {i, line->end - line->begin - i};
+    for (int side = 0; side < 2; side++)
+        if (line->fourth && !line->mirror[side] && from_end[side] < 4) return H[from_end[side]];
+    return from_end[0] && from_end[1] ? 1 : 0.5;
 }
 /* 2 Q_ij for j = i + offset. */
 static double tlsphi_line_pair(const tlsphi_interval *line, uint32_t i, int offset) {
@@ -7792,6 +7793,7 @@ static void tlsphi_voronoi_balance(const tlsphi_voronoi *v, const tlsphi_mesh *m
         }
         if (pass) break;
         tlsphi_solve_symmetric(second, first, b);
+        if (tlsphi_dot3(first, b) > 0.1 * S) b[0] = b[1] = b[2] = 0; /* a few particles cannot have any centroid */
         S = m->volume / (S - tlsphi_dot3(first, b));
     }
 }

@@ -67,6 +67,7 @@ static void *tally_allocate(void *user, size_t size)
     memcpy(block, &size, sizeof size);
     memset(block + TALLY_HEAD, 0xA5, size); /* nobody may count on zeros */
     counts->live++;
+    if (counts->live > counts->most_live) counts->most_live = counts->live;
     counts->live_bytes += size;
     if (counts->live_bytes > counts->most_bytes) counts->most_bytes = counts->live_bytes;
     return block + TALLY_HEAD;

@@ -20,7 +20,7 @@ double largest(const tlsph_real *values, size_t count);
 
 /* Counts what is allocated and not released; can make one allocation fail. */
 typedef struct tally {
-    size_t calls, live, live_bytes, most_bytes;
+    size_t calls, live, live_bytes, most_bytes, most_live;
     size_t fail_at; /* the number of the call that fails, from 1; 0: none */
     int wrong_size; /* a release named another size than its allocation */
 } tally;

@@ -204,6 +204,24 @@ TEST(balances_at_large_strain) {
     }
 }
 
-SUITE(cells4, ENTRY(exact_on_a_box_and_an_l_block), ENTRY(exact_on_a_ball_of_voxels), ENTRY(refusals),
+/* A mirror lets lines be shorter; creation itself finds out whether they are exact for linear fields. */
+TEST(short_lines_beside_a_mirror) {
+    const tlsph_material material = scene_paper_material(TLSPH_NEO_HOOKEAN);
+    const scene_options options = fourth(TLSPH_PF, TLSPH_ISOTHERMAL);
+    for (int n = 2; n < 9; n++)
+        for (int mirrors = 0; mirrors <= 3; mirrors++) {
+            const shape box = { TLSPH_BOX, { n, n, n }, 0, 0.25 };
+            tlsph_operator o;
+            double total = 0;
+            scene_body body;
+            if (!CHECK_RESULT(make(&box, mirrors, &material, &options, &body, NULL), TLSPH_OK)) continue;
+            tlsph_operator_view(body.solver, &o);
+            for (size_t a = 0; a < o.count; a++) total += (double)o.volumes[a];
+            CHECK_CLOSE(total / pow(0.25 * n, 3), 1, 1e2 * EPSILON);
+            scene_destroy(&body);
+        }
+}
+
+SUITE(cells4, ENTRY(short_lines_beside_a_mirror), ENTRY(exact_on_a_box_and_an_l_block), ENTRY(exact_on_a_ball_of_voxels), ENTRY(refusals),
       ENTRY(swinging_cube_of_order_4), ENTRY(stable_at_free_faces),
       ENTRY(balances_at_large_strain))

@@ -295,6 +295,228 @@ TEST(failing_allocations_in_measure)
     own_cloud_destroy(&s.cloud);
 }
 
+/* ---- every allocation fails in turn, in everything that creates ---- */
+
+/* Calls make with allocation 1, 2, 3, ... failing until it succeeds; make gives back what it made. Returns how many
+   allocations a success takes. */
+typedef tlsph_result (*make_fn)(const void *what, const tlsph_allocator *allocator, tlsph_error *error);
+static size_t sweep(make_fn make, const void *what)
+{
+    for (size_t n = 1; n < 1000; n++) {
+        tally counts;
+        tlsph_error error;
+        memset(&counts, 0, sizeof counts);
+        memset(&error, 0, sizeof error);
+        counts.fail_at = n;
+        const tlsph_allocator allocator = tally_allocator(&counts);
+        const tlsph_result result = make(what, &allocator, &error);
+        if (!CHECK(counts.live == 0 && counts.live_bytes == 0 && !counts.wrong_size)) return 0;
+        if (result == TLSPH_OK) return counts.calls;
+        if (!CHECK_RESULT(result, TLSPH_ERROR_MEMORY) || !CHECK_RESULT(error.result, TLSPH_ERROR_MEMORY)) return 0;
+        CHECK(error.message[0] && error.value > 0 && counts.calls >= n);
+    }
+    return 0;
+}
+
+static tlsph_result make_solver(const void *what, const tlsph_allocator *allocator, tlsph_error *error)
+{
+    tlsph_desc desc = *(const tlsph_desc *)what;
+    int nobody = 0;
+    tlsph_solver *solver = (tlsph_solver *)(void *)&nobody;
+    desc.allocator = *allocator;
+    const tlsph_result result = tlsph_create(&desc, &solver, error);
+    CHECK((result == TLSPH_OK) == (solver != NULL));
+    tlsph_destroy(solver);
+    return result;
+}
+static tlsph_result make_size(const void *what, const tlsph_allocator *allocator, tlsph_error *error)
+{
+    tlsph_desc desc = *(const tlsph_desc *)what;
+    tlsph_size size, before;
+    memset(&size, 0x5A, sizeof size);
+    before = size;
+    desc.allocator = *allocator;
+    const tlsph_result result = tlsph_measure(&desc, &size, error);
+    CHECK((result == TLSPH_OK) == (memcmp(&size, &before, sizeof size) != 0));
+    return result;
+}
+static tlsph_result make_cloud(const void *what, const tlsph_allocator *allocator, tlsph_error *error)
+{
+    tlsph_fill fill = *(const tlsph_fill *)what;
+    static const tlsph_cloud none; /* all zero */
+    tlsph_cloud cloud;
+    memset(&cloud, 0x5A, sizeof cloud);
+    fill.allocator = *allocator;
+    const tlsph_result result = tlsph_cloud_create(&fill, &cloud, error);
+    if (result) CHECK(memcmp(&cloud, &none, sizeof cloud) == 0);
+    tlsph_cloud_destroy(&cloud);
+    return result;
+}
+
+/* The pair vectors of a lattice as a host would give them. */
+static int own_pairs(tlsph_desc *lattice, tlsph_particles *out)
+{
+    lattice->operator_kind = TLSPH_CELLS;
+    tlsph_solver *solver = NULL;
+    tlsph_operator view;
+    if (!CHECK_RESULT(tlsph_create(lattice, &solver, NULL), TLSPH_OK)) return 0;
+    tlsph_operator_view(solver, &view);
+    size_t *first = malloc((view.count + 1) * sizeof *first), at = 0;
+    uint32_t *neighbours = malloc(view.pairs * sizeof *neighbours);
+    tlsph_real *vectors = calloc(3 * view.pairs, sizeof *vectors);
+    for (size_t h = 0; first && neighbours && vectors && h < view.count; h++) {
+        size_t a = 0;
+        while (view.host[a] != h) a++;
+        first[h] = at;
+        for (size_t k = view.first[a]; k < view.first[a + 1]; k++, at++) {
+            neighbours[at] = view.host[view.neighbours[k]];
+            memcpy(vectors + 3 * at, view.vectors + (size_t)view.dimension * k, (size_t)view.dimension * sizeof *vectors);
+        }
+        first[h + 1] = at;
+    }
+    out->first = first;
+    out->neighbours = neighbours;
+    out->pair_vectors = vectors;
+    tlsph_destroy(solver);
+    return 1;
+}
+
+/* A fixed face, mirrors and loads with values of their own, so that every array is asked for. */
+static void load_values(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,
+                        const tlsph_real *x, tlsph_real *values)
+{
+    (void)user, (void)time, (void)count, (void)particle, (void)X, (void)x, (void)values;
+}
+static void check_operator(tlsph_operator_kind kind, int dimension)
+{
+    tlsph_fill fill = tlsph_fill_default(dimension);
+    tlsph_cloud cloud;
+    tlsph_material material = soft_material(TLSPH_NEO_HOOKEAN);
+    tlsph_condition conditions[4] = {tlsph_condition_default(TLSPH_CLAMPED), tlsph_condition_default(TLSPH_ROLLER),
+                                     tlsph_condition_default(TLSPH_PRESSURE), tlsph_condition_default(TLSPH_VELOCITY)};
+    tlsph_desc desc = tlsph_desc_default(dimension);
+    uint32_t face[200];
+    for (int i = 0; i < dimension; i++) fill.size[i] = 1;
+    fill.spacing = R(0.25);
+    fill.voronoi = kind == TLSPH_CLOSED;
+    fill.jitter = R(fill.voronoi ? 0.1 : 0);
+    REQUIRE_OK(tlsph_cloud_create(&fill, &cloud, NULL));
+    const size_t count = tlsph_select_plane(&cloud.particles, 0, 0, R(1e-3), face, 200);
+    for (int i = 0; i < 4; i++) {
+        conditions[i].particles = face;
+        conditions[i].count = count;
+        conditions[i].normal[0] = 1;
+        conditions[i].values = load_values;
+    }
+    desc.particles = cloud.particles;
+    desc.materials = &material;
+    desc.material_count = 1;
+    desc.threads = 1;
+    if (kind == TLSPH_GIVEN) REQUIRE(own_pairs(&desc, &desc.particles));
+    desc.operator_kind = kind;
+    if (kind > TLSPH_CELLS && kind < TLSPH_CELLS_4) desc.support = R(0.9);
+    if (kind == TLSPH_CLOSED) {
+        desc.support = R(0.825);
+        desc.kernel = TLSPH_WENDLAND_C2;
+        desc.tight_closure = 1;
+    }
+    desc.conditions = conditions;
+    desc.condition_count = 4;
+    const size_t allocations = sweep(make_solver, &desc), measured = sweep(make_size, &desc);
+    CHECK(measured > 5 && allocations > measured);
+    REPORT("%d ", (int)allocations);
+    if (desc.particles.first != cloud.particles.first) {
+        free((void *)desc.particles.first);
+        free((void *)desc.particles.neighbours);
+        free((void *)desc.particles.pair_vectors);
+    }
+    tlsph_cloud_destroy(&cloud);
+}
+TEST(failing_allocations_of_every_operator)
+{
+    for (int dimension = 2; dimension <= 3; dimension++)
+        for (int kind = TLSPH_CORRECTED_KERNEL; kind <= TLSPH_CLOSED; kind++)
+            check_operator((tlsph_operator_kind)kind, dimension);
+}
+
+static tlsph_real ball(void *user, const tlsph_real X[3])
+{
+    static const tlsph_real centre[3] = {R(0.5), R(0.5), R(0.5)}, middle[3] = {R(0.5), R(0.5), 0};
+    return tlsph_distance_sphere(X, user ? middle : centre, R(0.45));
+}
+static tlsph_real finer_to_the_right(void *user, const tlsph_real X[3])
+{
+    (void)user;
+    return R(0.25) - R(0.08) * X[0];
+}
+static const tlsph_real tetrahedron[36] = {0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1,
+                                           0, 0, 0, 0, 0, 1, 0, 1, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+TEST(failing_allocations_of_clouds)
+{
+    static const tlsph_shape shapes[4] = {TLSPH_BOX, TLSPH_L_SHAPE, TLSPH_SPHERE, TLSPH_DISTANCE};
+    int plane = 1;
+    for (int i = 0; i < 24; i++) {
+        tlsph_fill fill = tlsph_fill_default(2 + i / 12);
+        if (i / 12 && i % 12 % 5) continue; /* of space every shape and every placement once */
+        fill.shape = shapes[i % 4];
+        fill.placement = (tlsph_placement)(i / 4 % 3);
+        fill.voronoi = fill.shape < TLSPH_CYLINDER;
+        for (int k = 0; k < fill.dimension; k++) fill.size[k] = 1;
+        fill.notch[0] = fill.notch[1] = R(0.5);
+        fill.spacing = R(0.34);
+        fill.distance = ball;
+        fill.distance_user = fill.dimension == 2 ? &plane : NULL;
+        if (fill.shape == TLSPH_DISTANCE) fill.spacing_at = finer_to_the_right;
+        REPORT("%d ", (int)sweep(make_cloud, &fill));
+    }
+    tlsph_fill fill = tlsph_fill_default(3);
+    fill.shape = TLSPH_TRIANGLES;
+    fill.placement = TLSPH_SCATTERED;
+    fill.spacing = R(0.5);
+    fill.surface.count = 4;
+    fill.surface.corners = tetrahedron;
+    CHECK(sweep(make_cloud, &fill) > 20);
+}
+static tlsph_result make_voronoi(const void *what, const tlsph_allocator *allocator, tlsph_error *error)
+{
+    static const tlsph_real positions[6] = {R(0.1), R(0.1), R(0.1), R(0.3), R(0.3), R(0.2)};
+    tlsph_particles particles;
+    tlsph_surface surface = {4, tetrahedron};
+    tlsph_real volumes[2] = {-1, -1}, areas[6] = {-1, -1, -1, -1, -1, -1};
+    (void)what;
+    memset(&particles, 0, sizeof particles);
+    particles.count = 2;
+    particles.positions = positions;
+    particles.spacing = 1;
+    const tlsph_result result = tlsph_voronoi(3, &particles, &surface, allocator, volumes, areas, error);
+    if (result) CHECK(volumes[0] < 0 && volumes[1] < 0 && areas[0] < 0 && areas[5] < 0);
+    else CHECK_CLOSE(volumes[0] + volumes[1], 1.0 / 6, 100 * EPSILON);
+    return result;
+}
+TEST(failing_allocations_of_cells_of_particles) { CHECK(sweep(make_voronoi, NULL) > 10); }
+
+/* Scratch lists are of fixed length: growing arrays must not fill them. 5000 particles make them grow. */
+TEST(growing_arrays_give_back_the_old_ones)
+{
+    size_t most[2];
+    for (int i = 0; i < 2; i++) {
+        tlsph_fill fill = tlsph_fill_default(2);
+        tlsph_cloud cloud;
+        tally counts;
+        memset(&counts, 0, sizeof counts);
+        fill.placement = TLSPH_SCATTERED;
+        fill.size[0] = fill.size[1] = 1;
+        fill.spacing = R(i ? 0.0145 : 0.05);
+        fill.allocator = tally_allocator(&counts);
+        REQUIRE_OK(tlsph_cloud_create(&fill, &cloud, NULL));
+        CHECK(i == 0 || cloud.particles.count > 4200);
+        most[i] = counts.most_live;
+        tlsph_cloud_destroy(&cloud);
+        CHECK_SAME(counts.live, 0);
+    }
+    CHECK_SAME(most[1], most[0]);
+}
+
 TEST(a_step_allocates_nothing)
 {
     int u, t;
@@ -358,5 +580,8 @@ TEST(destroying_nothing)
 SUITE(memory, ENTRY(every_unknown_adds_bytes), ENTRY(heat_adds_bytes), ENTRY(two_dimensions_need_less),
       ENTRY(leanest_scene_is_lean), ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
       ENTRY(field_table), ENTRY(callers_memory_is_used), ENTRY(callers_memory_too_small),
-      ENTRY(failing_allocations_leak_nothing), ENTRY(failing_allocations_in_measure), ENTRY(a_step_allocates_nothing),
+      ENTRY(failing_allocations_leak_nothing), ENTRY(failing_allocations_in_measure),
+      ENTRY(failing_allocations_of_every_operator), ENTRY(failing_allocations_of_clouds),
+      ENTRY(failing_allocations_of_cells_of_particles), ENTRY(growing_arrays_give_back_the_old_ones),
+      ENTRY(a_step_allocates_nothing),
       ENTRY(half_an_allocator_is_refused), ENTRY(destroying_nothing))
