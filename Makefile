@@ -2,7 +2,8 @@
 #
 #   make            examples -> build/<example>         make test    unit and physics tests, about 4 minutes
 #   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
-#   make bench      timings                             make coverage, make clean
+#   make bench      timings and short study, 10 min     make bench-full    the whole study, more than an hour
+#   make coverage, make clean
 #   make portability    the tests with other compilers, C libraries, machines and systems, as far as installed
 #
 # CFLAGS are yours (default -O3 -march=native); threads: OMP_NUM_THREADS or --threads of the examples.
@@ -27,6 +28,7 @@ SHARED := $(wildcard examples/common/*.c examples/scenes/*.c) tests/implementati
 TESTS := $(filter-out tests/implementation.c tests/fuzz.c,$(wildcard tests/*.c))
 TOPICS := $(patsubst tests/test_%.c,%,$(wildcard tests/test_*.c))
 BENCHES := $(wildcard bench/*.c)
+BENCH_PROGRAMS := build/bench build/textbook build/scaling build/study build/study_float
 
 all: $(EXAMPLES)
 	@echo "examples are in build/ (each tells its options with --help)"
@@ -70,11 +72,18 @@ $(eval $(call flavour,coverage,-O0 -g --coverage,-O0))
 $(EXAMPLES): build/%: build/obj/double/examples/%.o build/obj/double/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 
-build/bench: $(BENCHES:%.c=build/obj/double/%.o) build/obj/double/shared.a
+build/bench build/textbook build/scaling: build/%: build/obj/double/bench/%.o build/obj/double/bench/machine.o build/obj/double/shared.a
+	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
+build/study: build/obj/double/bench/study.o build/obj/double/bench/runs.o build/obj/double/shared.a
+	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
+build/study_float: build/obj/float/bench/study.o build/obj/float/bench/runs.o build/obj/float/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 
-bench: $(if $(BENCHES),build/bench)
-	$(if $(BENCHES),build/bench --quick,@echo "no bench")
+bench bench-full: $(BENCH_PROGRAMS)
+	build/bench $(if $(filter bench,$@),--quick)
+	build/textbook
+	build/scaling
+	sh bench/study.sh $(if $(filter bench,$@),300 "",3600 --full)
 
 # Scenes and checkpoints of random bytes; tests/fuzz.c tells how libFuzzer and AFL++ run it.
 build/fuzz: tests/fuzz.c tlsph.h
@@ -127,7 +136,7 @@ clean:
 	rm -rf build out
 
 FORCE:
-.PHONY: all demo bench test check check-only coverage portability clean FORCE
+.PHONY: all demo bench bench-full test check check-only coverage portability clean FORCE
 .SECONDARY:
 
 -include $(shell find build/obj -name '*.d' 2> /dev/null)

@@ -154,9 +154,11 @@ typedef struct {
     const char *name; /* legend; NULL: not in the legend */
     const double *x, *y;
     size_t count;
-    int style;  /* 0 line, 1 dashed, 2 markers, 3 line and markers */
+    int style;  /* 0 line, 1 dashed, 2 markers, 3 line and markers, EX_NOTE */
     int colour; /* palette index */
 } ex_curve;
+
+#define EX_NOTE 4 /* markers with the name to the lower left of each instead of in the legend */
 
 typedef struct {
     const char *title, *x_label, *y_label;

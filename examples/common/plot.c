@@ -202,7 +202,7 @@ static int points_covered(const chart *c, const ex_box *b) {
         int joined = 0;
         for (size_t j = 0; j < curve->count; j += stride) {
             int ok = place_point(c, curve, j, at);
-            if (ok && joined && curve->style != 2) hits += line_meets(b, last, at);
+            if (ok && joined && curve->style != 2 && curve->style != EX_NOTE) hits += line_meets(b, last, at);
             else if (ok) hits += inside(b, at);
             if (ok) memcpy(last, at, sizeof last);
             joined = ok;
@@ -211,11 +211,13 @@ static int points_covered(const chart *c, const ex_box *b) {
     return hits;
 }
 
+static int in_legend(const ex_curve *curve) { return curve->name && curve->style != EX_NOTE; }
+
 static void legend_extent(const chart *c, double *width, double *height) {
     double widest = 0.0;
     int lines = 0;
     for (int i = 0; i < c->count; i++) {
-        if (!c->curves[i].name) continue;
+        if (!in_legend(&c->curves[i])) continue;
         widest = fmax(widest, ex_label_width(c->size, c->curves[i].name));
         lines++;
     }
@@ -308,7 +310,7 @@ static int colour_of(const ex_curve *curve) { return (curve->colour % COLOURS + 
 static void draw_piece(chart *c, const ex_box *clip, const ex_curve *curve, const double from[2], const double to[2],
                        double *travelled) {
     const double *rgb = palette[colour_of(curve)];
-    if (curve->style == 2 || !line_meets(clip, from, to)) return;
+    if (curve->style == 2 || curve->style == EX_NOTE || !line_meets(clip, from, to)) return;
     if (curve->style == 1) fine_dashes(c, clip, from, to, rgb, travelled);
     else fine_line(c, clip, from, to, 0.6 * c->size, rgb);
 }
@@ -361,7 +363,7 @@ static void draw_legend_samples(chart *c) {
     for (int i = 0; i < c->count; i++) {
         double from[2] = { b->left + 6 * c->size, y }, to[2], middle[2];
         double travelled = 0.0;
-        if (!c->curves[i].name) continue;
+        if (!in_legend(&c->curves[i])) continue;
         to[0] = from[0] + 23 * c->size;
         middle[0] = 0.5 * (from[0] + to[0]);
         to[1] = middle[1] = y;
@@ -405,9 +407,21 @@ static void draw_axis_texts(const chart *c) {
 static void draw_legend_texts(const chart *c) {
     double y = c->legend.top + 9 * c->size;
     for (int i = 0; i < c->count; i++) {
-        if (!c->curves[i].name) continue;
+        if (!in_legend(&c->curves[i])) continue;
         put_text(c, c->legend.left + 34 * c->size, y, EX_LEFT, 0, c->curves[i].name);
         y += 13 * c->size;
+    }
+}
+
+static void draw_notes(const chart *c) {
+    for (int i = 0; i < c->count; i++) {
+        const ex_curve *curve = &c->curves[i];
+        double at[2];
+        if (curve->style != EX_NOTE || !curve->name) continue;
+        for (size_t j = 0; j < curve->count; j++)
+            if (place_point(c, curve, j, at) && inside(&c->frame, at))
+                ex_label(c->page, c->x0 + at[0] - 4 * c->size, c->y0 + at[1] + 5 * c->size, 0.8 * c->size,
+                         at[0] - c->frame.left > ex_label_width(c->size, curve->name) ? EX_RIGHT : EX_LEFT, 0, curve->name);
     }
 }
 
@@ -428,6 +442,7 @@ static int draw_chart(chart *c) {
     draw_tick_texts(c);
     draw_axis_texts(c);
     draw_legend_texts(c);
+    draw_notes(c);
     return 0;
 }
 

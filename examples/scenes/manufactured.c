@@ -189,13 +189,15 @@ static void initial_state(const void *scene, const tlsph_real X[3], scene_state 
 #define CALLBACK(name, components, prepare, value)                                                                     \
     static void name(void *user, tlsph_real time, size_t count, const uint32_t *particle, const tlsph_real *X,         \
                      const tlsph_real *x, tlsph_real *values) {                                                        \
-        const manufactured *cube = user;                                                                               \
+        manufactured *cube = user;                                                                                     \
+        const double began = ex_cpu_seconds();                                                                         \
         (void)particle; (void)x; (void)time;                                                                           \
         for (size_t i = 0; i < count; i++) {                                                                           \
             const tlsph_real *at = X + 3 * i;                                                                          \
             prepare;                                                                                                   \
             for (size_t j = 0; j < components; j++) values[components * i + j] = (tlsph_real)(value);                  \
         }                                                                                                              \
+        cube->load_seconds += ex_cpu_seconds() - began;                                                                \
     }
 CALLBACK(exact_velocity, 3, const double r2 = (double)(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]),
          cube->parameters.rate * r2)

@@ -81,6 +81,21 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = quiet;
 }
 
+int scene_options_preset(scene_options *options, const char *name) {
+    static const char *const names[] = { "fast", "balanced", "accurate" };
+    tlsph_desc desc = tlsph_desc_default(3);
+    int i = 0;
+    while (i < 3 && strcmp(names[i], name)) i++;
+    if (i == 3) return 0;
+    scene_options_apply(options, &desc);
+    tlsph_preset(&desc, (tlsph_preset_name)i);
+    options->operator_kind = (int)desc.operator_kind;
+    options->integrator = (int)desc.integrator;
+    options->sharp = desc.sharp_gradients;
+    options->cfl = (double)desc.cfl;
+    return 1;
+}
+
 void scene_options_cloud(scene_options *options, tlsph_fill *fill) {
     options->sharp = 0;
     if (options->operator_kind != TLSPH_CORRECTED_KERNEL) return;

@@ -42,6 +42,8 @@ void scene_option_table(scene_options *options, ex_option *table);
 /* Irregular clouds: the closed operator instead of the default one, with the volumes and areas that it needs. */
 void scene_options_cloud(scene_options *options, tlsph_fill *fill);
 void scene_options_apply(const scene_options *options, tlsph_desc *desc);
+/* tlsph_preset by name: fast, balanced, accurate. 0 for another name, without a change. */
+int scene_options_preset(scene_options *options, const char *name);
 
 /* ---- a body under construction ----------------------------------------------------------------------------------- */
 
@@ -544,7 +546,11 @@ typedef struct manufactured_parameters {
     tlsph_material material; /* linear, MEE or Mie-Grueneisen */
 } manufactured_parameters;
 
-typedef struct manufactured { scene_body body; manufactured_parameters parameters; } manufactured;
+typedef struct manufactured {
+    scene_body body;
+    manufactured_parameters parameters;
+    double load_seconds;  /* processor time that the exact sources have taken, which is none of the method's */
+} manufactured;
 
 /* All that is exact at a point: force per reference volume (N/m^3), heat source (W/m^3); energy with its kinetic part. */
 typedef struct manufactured_state {

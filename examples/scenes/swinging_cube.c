@@ -55,6 +55,7 @@ static tlsph_material make_material(const swinging_cube_parameters *p) {
     material.young = (tlsph_real)p->young;
     material.poisson = (tlsph_real)p->poisson;
     material.density = (tlsph_real)p->density;
+    material.specific_heat = 1; /* thermal runs only; without expansion any will do */
     return material;
 }
 

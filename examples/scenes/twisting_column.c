@@ -39,6 +39,7 @@ tlsph_result twisting_column_create(const twisting_column_parameters *p, twistin
     material.young = (tlsph_real)17e6;
     material.density = 1100;
     material.poisson = (tlsph_real)p->nu;
+    material.specific_heat = 1; /* thermal runs only; without expansion any will do */
     fill.size[0] = fill.size[2] = 1;
     fill.size[1] = (tlsph_real)LENGTH;
     fill.origin[0] = fill.origin[2] = (tlsph_real)-0.5;
