@@ -656,12 +656,13 @@ typedef struct tlsph_shape_functions {
 
 /* -- describe -- */
 TLSPH_API tlsph_desc tlsph_desc_default(int dimension);
-/* Sets how a scene is computed, after the host has chosen what (unknowns, thermal, operator): integrator, cfl,
-   sharp_gradients and, on lattices, operator_kind. Points of the measured front of error against time (bench/study.c):
-     FAST      three stages, dissipation once a step, CFL 0.5: the least time, the accuracy of the default
-     BALANCED  the same with sharp gradients where C_ab is antisymmetric: smooth motion ten times as accurate
-     ACCURATE  four stages and sharp gradients
-   Nothing on unknown presets. */
+/* Sets how a scene is computed, when `particles` and what is computed (unknowns, thermal, operator) are set: integrator,
+   cfl, conduction_stages (9), sharp_gradients, and TLSPH_CELLS where the operator is one of lattices with 6 neighbours.
+   Points of the measured front of error against time (bench/study.c):
+     TLSPH_PRESET_FAST      TLSPH_RK3_FROZEN at its largest CFL number
+     TLSPH_PRESET_BALANCED  the same, on lattices with sharp gradients
+     TLSPH_PRESET_ACCURATE  TLSPH_RK4_FROZEN, on lattices with sharp gradients
+   Leaves incompressible scenes as they are. */
 TLSPH_API void tlsph_preset(tlsph_desc *desc, tlsph_preset_name name);
 TLSPH_API tlsph_material tlsph_material_default(tlsph_material_kind kind);
 TLSPH_API tlsph_condition tlsph_condition_default(tlsph_condition_kind kind);
@@ -6982,10 +6983,14 @@ TLSPHI_DEF tlsph_desc tlsph_desc_default(int dimension) {
     return d;
 }
 TLSPHI_DEF void tlsph_preset(tlsph_desc *d, tlsph_preset_name name) {
-    if ((unsigned)name > TLSPH_PRESET_ACCURATE) return;
+    const int lattice = d->operator_kind == TLSPH_CELLS || d->operator_kind == TLSPH_CELLS_4 ||
+                        (d->operator_kind == TLSPH_CORRECTED_KERNEL && d->support <= TLSPHI_R(0.6) && d->particles.cell_count);
+    if ((unsigned)name > TLSPH_PRESET_ACCURATE || d->scheme != TLSPH_EXPLICIT) return;
+    if (lattice) d->operator_kind = TLSPH_CELLS;
+    d->sharp_gradients = lattice && name != TLSPH_PRESET_FAST;
     d->integrator = name == TLSPH_PRESET_ACCURATE ? TLSPH_RK4_FROZEN : TLSPH_RK3_FROZEN;
-    d->cfl = TLSPHI_R(0.5);
-    d->sharp_gradients = name != TLSPH_PRESET_FAST;
+    d->cfl = tlsph_cfl_limit(d->integrator);
+    d->conduction_stages = 9;
 }
 TLSPHI_DEF tlsph_material tlsph_material_default(tlsph_material_kind kind) {
     tlsph_material m;

@@ -13,6 +13,12 @@ void driver_arguments(int argc, char **argv, const char *program, const char *su
                       const ex_option *own, int own_count) {
     ex_option table[OWN_OPTIONS + SCENE_OPTION_COUNT];
     if (own_count > OWN_OPTIONS) own_count = OWN_OPTIONS;
+    for (int i = 1; i < argc; i++) { /* first, so that options on either side of it count more */
+        const size_t length = strlen("--preset");
+        if (strncmp(argv[i], "--preset", length)) continue;
+        if (argv[i][length] == '=') scene_options_preset(options, argv[i] + length + 1);
+        else if (!argv[i][length] && i + 1 < argc) scene_options_preset(options, argv[i + 1]);
+    }
     memcpy(table, own, (size_t)own_count * sizeof *own);
     scene_option_table(options, table + own_count);
     ex_arguments(argc, argv, program, summary, table, own_count + SCENE_OPTION_COUNT);

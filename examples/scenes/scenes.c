@@ -51,6 +51,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     const ex_option check = { "check", EX_FLAG, &o->check, NULL, NULL, 0, 0, "tell cost and doubts of the scene, do not run it" };
     const ex_option output = { "output", EX_TEXT, &o->output, NULL, NULL, 0, 0, "folder to write to" };
     size_t i = 0;
+    table[i++] = choice("preset", &o->preset, "none|fast|balanced|accurate", "how to compute; other options change it further");
     table[i++] = real("end-time", &o->end_time, "s", 1e-12, 1e12, "time to stop at");
     table[i++] = real("cfl", &o->cfl, "", 1e-6, 1, "Courant number (000-78)");
     table[i++] = choice("unknowns", &o->unknowns, "pF|pFJ|pFHJ|pFH", "deformation measures that are evolved");
@@ -88,17 +89,19 @@ int scene_options_preset(scene_options *options, const char *name) {
     while (i < 3 && strcmp(names[i], name)) i++;
     if (i == 3) return 0;
     scene_options_apply(options, &desc);
+    desc.particles.cell_count = 1; /* scenes are lattices; irregular ones end in scene_options_cloud */
     tlsph_preset(&desc, (tlsph_preset_name)i);
     options->operator_kind = (int)desc.operator_kind;
     options->integrator = (int)desc.integrator;
     options->sharp = desc.sharp_gradients;
+    options->conduction_stages = desc.conduction_stages;
     options->cfl = (double)desc.cfl;
     return 1;
 }
 
 void scene_options_cloud(scene_options *options, tlsph_fill *fill) {
     options->sharp = 0;
-    if (options->operator_kind != TLSPH_CORRECTED_KERNEL) return;
+    if (options->operator_kind != TLSPH_CORRECTED_KERNEL && !options->preset) return; /* a preset chose for lattices */
     options->operator_kind = TLSPH_CLOSED;
     options->kernel = TLSPH_WENDLAND_C2;
     options->support = 0.825;
