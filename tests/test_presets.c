@@ -37,7 +37,7 @@ TEST(leave_the_rest_alone) {
     CHECK_SAME(desc.sharp_gradients, 0);
 }
 
-/* Error of p_x on the swinging cube after a quarter of a period. */
+/* Error of p_x on the swinging cube after 9/8 periods. */
 static double cube_error(const char *preset, double jitter) {
     swinging_cube_parameters p;
     swinging_cube cube;
@@ -46,9 +46,9 @@ static double cube_error(const char *preset, double jitter) {
     p.options.operator_kind = TLSPH_CORRECTED_KERNEL;
     p.options.integrator = TLSPH_RK2;
     p.options.cfl = 0.3;
-    p.options.end_time = 0.004;
+    p.options.end_time = 0.018; /* 9/8 periods */
     p.options.preset = preset[0] != 0;
-    p.n = 8;
+    p.n = 5;
     p.jitter = jitter;
     p.amplitude = 5e-4;
     CHECK_SAME(scene_options_preset(&p.options, preset), preset[0] != 0);
@@ -66,7 +66,7 @@ TEST(errors_fall_from_preset_to_preset) {
     CHECK_BELOW(fast, 1.5 * base);
     CHECK_BELOW(balanced, fast / 10);
     CHECK_BELOW(accurate, balanced);
-    CHECK_BELOW(cube_error("accurate", 0.2), 0.05);
+    CHECK_BELOW(cube_error("accurate", 0.2), 1.3 * cube_error("", 0.2)); /* irregular: the closed operator */
 }
 
 SUITE(presets, ENTRY(set_what_they_promise), ENTRY(leave_the_rest_alone), ENTRY(errors_fall_from_preset_to_preset))
