@@ -3,7 +3,7 @@
 #   make            examples -> build/<example>         make test    unit and physics tests, about 4 minutes
 #   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
 #   make bench      timings and short study, 10 min     make bench-full    the whole study, more than an hour
-#   make coverage, make clean
+#   make extremes   how far it goes, a table, 6 min     make coverage, make clean
 #   make portability    the tests with other compilers, C libraries, machines and systems, as far as installed
 #
 # CFLAGS are yours (default -O3 -march=native); threads: OMP_NUM_THREADS or --threads of the examples.
@@ -25,7 +25,7 @@ VALGRIND := $(shell command -v valgrind 2> /dev/null)
 EXAMPLES := $(patsubst examples/%.c,build/%,$(wildcard examples/*.c))
 # One archive a flavour: the library and what examples, tests and benches share. A program takes from it what it needs.
 SHARED := $(wildcard examples/common/*.c examples/scenes/*.c) tests/implementation.c
-TESTS := $(filter-out tests/implementation.c tests/fuzz.c,$(wildcard tests/*.c))
+TESTS := $(filter-out tests/implementation.c tests/fuzz.c tests/extremes.c,$(wildcard tests/*.c))
 TOPICS := $(patsubst tests/test_%.c,%,$(wildcard tests/test_*.c))
 BENCHES := $(wildcard bench/*.c)
 BENCH_PROGRAMS := build/bench build/textbook build/scaling build/study build/study_float
@@ -52,6 +52,8 @@ build/obj/$(1)/tests/implementation.o: tests/implementation.c
 build/obj/$(1)/shared.a: $(SHARED:%.c=build/obj/$(1)/%.o)
 	@rm -f $$@
 	$$(AR) rcs $$@ $$^
+build/extremes_$(1): build/obj/$(1)/tests/extremes.o build/obj/$(1)/shared.a
+	$$(CC) $(2) $$^ -o $$@ $(LDLIBS)
 build/test_$(1): $(TESTS:%.c=build/obj/$(1)/%.o) build/obj/$(1)/shared.a
 	$$(CC) $(2) $$^ -o $$@ $(LDLIBS)
 endef
@@ -128,6 +130,10 @@ coverage: build/test_coverage
 	@sed -n "/^File.*tlsph.h'/,/^$$/p" build/obj/coverage/gcov.txt
 	@sed -n "/^File.*tlsph.h'/,/^$$/s/^Taken at least once:\([0-9.]*\)%.*/result branch_coverage \1 %/p" build/obj/coverage/gcov.txt
 
+# How far it goes: tests/extremes.c.
+extremes: build/extremes_double build/extremes_float
+	@sh tests/run.sh build/extremes_double build/extremes_float
+
 # Other compilers, C libraries, word sizes, byte orders, Windows.
 portability:
 	@sh tests/portability.sh
@@ -136,7 +142,7 @@ clean:
 	rm -rf build out
 
 FORCE:
-.PHONY: all demo bench bench-full test check check-only coverage portability clean FORCE
+.PHONY: all demo bench bench-full test check check-only coverage extremes portability clean FORCE
 .SECONDARY:
 
 -include $(shell find build/obj -name '*.d' 2> /dev/null)
