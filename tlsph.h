@@ -2511,6 +2511,7 @@ static tlsph_result tlsphi_closure_start(tlsphi_closer *c) {
     const size_t D = (size_t)plan->dim, rows = c->rows;
     const double area = pow(c->unit, (double)D - 1), volume = pow(c->unit, (double)D);
     double sums[4];
+    memset(c->p, 0, c->n * c->width * sizeof *c->p); /* the start has l = 0; the sums of the parts were there */
     for (size_t i = 0; i < c->n; i++) {
         double m[9];
         const tlsph_result r = tlsphi_closure_particle(c, i, m);
@@ -3228,6 +3229,7 @@ struct tlsph_solver {
     tlsphi_material *materials;
     size_t material_count;
     uint8_t *material_of; /* NULL: one material */
+    tlsph_real *beside; /* 2 a particle, NULL: one material; see tlsphi_fill_interfaces */
     /* operator */
     size_t *first;
     uint32_t *neighbour;
@@ -3463,13 +3465,15 @@ static double tlsphi_particle_step(const tlsph_solver *s, size_t a, const tlsphi
     double tau = (double)s->tau[a], dt = TLSPHI_LARGEST;
     *heat = TLSPHI_LARGEST;
     if (pt->c_p > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE) dt = (double)s->cfl * tau / (double)pt->c_p;
+    if (s->beside) dt *= (double)s->beside[2 * a];
     if (s->sharp) tau *= TLSPHI_SHARP_STEP; /* sharp gradients are for v only: heat keeps its stencil */
-    if (s->conducts && m->h > 0) {
+    const tlsph_real h = s->beside ? s->beside[2 * a + 1] : m->h;
+    if (s->conducts && h > 0) {
         tlsph_real HtH[9];
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++)
                 HtH[3 * i + j] = pt->H[i] * pt->H[j] + pt->H[3 + i] * pt->H[3 + j] + pt->H[6 + i] * pt->H[6 + j];
-        const tlsph_real K = m->h / pt->J * tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
+        const tlsph_real K = h / pt->J * tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
         *heat = 0.8 * (double)m->c_v * tau * tau / (2 * s->dim * (double)K);
     }
     return s->super.most ? dt : tlsphi_dmin(dt, *heat);
@@ -3629,6 +3633,10 @@ static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block) {
    the round-off of Sigma_J is large, and 1e-8 was too little for a twisting column. */
 #define TLSPHI_LIMITER_FLOOR TLSPHI_R(TLSPHI_EPSILON > 1e-10 ? 3e-4 : 1e-6)
 
+/* Density in the impedance of a pair: the harmonic mean, which is at most twice the lighter one. With the plain mean the
+   lighter side is stopped in less than a step where its neighbour has many times its density, and nothing is stable. */
+TLSPHI_INLINE tlsph_real tlsphi_pair_density(tlsph_real a, tlsph_real b) { return a == b ? a : 2 * a * b / (a + b); }
+
 /* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; front in [0, 1] gives the normal part
    of the raw jump back. */
 TLSPHI_INLINE void tlsphi_damp_velocity(int dim, int kind, const tlsph_real *Dv, const tlsph_real *Dr,
@@ -3727,7 +3735,8 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
     }
     const tlsph_real DS = b->Sigma_J - a->Sigma_J;
     const tlsph_real DSr = DS - (tlsphi_dot(3, a->Sigma_J_gradient, d) + tlsphi_dot(3, b->Sigma_J_gradient, d)) / 2;
-    tlsphi_damp_velocity(3, (int)kind, Dv, Dr, n, front, rho * CC / 2, c_p, c_s, out->D_p);
+    tlsphi_damp_velocity(3, (int)kind, Dv, Dr, n, front, tlsphi_pair_density(a->density, b->density) * CC / 2, c_p, c_s,
+                         out->D_p);
     out->D_J = S_J * tlsphi_damped_jump((int)kind, DS, DSr, front);
     for (int i = 0; i < 3; i++) out->D_E += (a->velocity[i] + b->velocity[i]) / 2 * out->D_p[i];
     out->D_E += (a->Sigma_J + b->Sigma_J) / 2 * out->D_J;
@@ -4067,7 +4076,7 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t
         tlsphi_multiply(dim, s->grad_w + dd * b, d, Gd_b);
         front = tlsphi_front(raw, tlsphi_dot(dim, n, Gd_a), tlsphi_dot(dim, n, Gd_b), c_p);
     }
-    tlsphi_damp_velocity(dim, kind, Dv, Dr, n, front, rho * CC / 2, c_p, c_s, D_p);
+    tlsphi_damp_velocity(dim, kind, Dv, Dr, n, front, tlsphi_pair_density(w_a[2], w_b[2]) * CC / 2, c_p, c_s, D_p);
     if (with_J) {
         DS = s->S[b] - s->S[a];
         const tlsph_real slope = (tlsphi_dot(dim, s->grad_S + D * a, d) + tlsphi_dot(dim, s->grad_S + D * b, d)) / 2;
@@ -4118,7 +4127,9 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
    the compact form the difference between the two-point flux k (theta_b - theta_a) and its value from the gradients. On an
    undeformed lattice the sum is the two-point flux, under shear the mixed terms of K stay; the limiter is that of the
    dissipation, so heat of this part only flows down the pair's temperature difference. k = h/J |c|^2/|C|^2 (C.d)/|d|^2,
-   on lattices h/J |c|^2/(C.d), which is unbounded in clouds, where C may be nearly perpendicular to d. */
+   on lattices h/J |c|^2/(C.d), which is unbounded in clouds, where C may be nearly perpendicular to d.
+   Where one neighbour is more than twice as hot as the other, the products Q_a theta_b/theta_a of the double gradient are
+   larger than any flux, and unstable; there the two-point flux stands alone. */
 TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g, const tlsph_real *C,
                                     const tlsph_real *rest, const int dim, const int thermal, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, dd = D * D;
@@ -4127,17 +4138,20 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, c
         q_a += tlsphi_dot(dim, s->heat + D * a, rest);
         q_b -= tlsphi_dot(dim, s->heat + D * b, rest);
     }
-    const tlsph_real theta_a = s->theta[a], theta_b = s->theta[b];
-    sum->source -= q_a * (theta_b - theta_a);
-    if (thermal == TLSPH_ENERGY) sum->heat -= (q_a * theta_b + q_b * theta_a) / 2;
-    else sum->heat -= (q_a + q_b) / 2;
-    if (s->conduction != TLSPH_COMPACT) return;
+    const tlsph_real theta_a = s->theta[a], theta_b = s->theta[b], D_theta = theta_b - theta_a;
+    const int compact = s->conduction == TLSPH_COMPACT, front = compact && tlsphi_abs(D_theta) > tlsphi_min(theta_a, theta_b);
+    if (!front) {
+        sum->source -= q_a * D_theta;
+        if (thermal == TLSPH_ENERGY) sum->heat -= (q_a * theta_b + q_b * theta_a) / 2;
+        else sum->heat -= (q_a + q_b) / 2;
+    }
+    if (!compact) return;
     tlsph_real d[3], c_a[3], c_b[3];
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
-    const tlsph_real Cd = tlsphi_dot(dim, C, d), D_theta = theta_b - theta_a;
+    const tlsph_real Cd = tlsphi_dot(dim, C, d);
     const tlsph_real slope =
         (tlsphi_dot(dim, s->grad_theta + D * a, d) + tlsphi_dot(dim, s->grad_theta + D * b, d)) / 2;
-    const tlsph_real jump = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0);
+    const tlsph_real jump = front ? D_theta : tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0);
     if (!(Cd > 0)) return;
     tlsphi_multiply(dim, s->A + dd * a, g, c_a);
     tlsphi_multiply(dim, s->A + dd * b, g, c_b);
@@ -6550,6 +6564,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->materials = TLSPHI_TAKE(arena, tlsphi_material, s->material_count);
     const size_t fixed = arena->used;
     if (s->material_count > 1) s->material_of = TLSPHI_TAKE(arena, uint8_t, n);
+    if (s->material_count > 1) s->beside = TLSPHI_TAKE(arena, tlsph_real, 2 * n);
     s->block = TLSPHI_TAKE(arena, tlsphi_block, s->blocks);
     s->body = TLSPHI_TAKE(arena, tlsphi_body, s->bodies);
     s->host = TLSPHI_TAKE(arena, uint32_t, n);
@@ -6720,6 +6735,22 @@ static void tlsphi_fill_laplacian(tlsph_solver *s) {
     }
     s->jst_step = fastest > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE ? TLSPHI_JST_STEP / fastest : TLSPHI_LARGEST;
 }
+/* Where materials meet, a particle feels half of its neighbour's stiffness M = rho c_p^2 and conductivity with its own mass
+   and heat capacity: it vibrates as if its sound were that of (M_a + M_b)/(2 rho_a). By this its step is shortened. */
+static void tlsphi_fill_interfaces(tlsph_solver *s) {
+    for (size_t a = 0; s->beside && a < s->n; a++) {
+        const tlsphi_material *m = tlsphi_material_of(s, a);
+        double stiffest = 1, h = (double)m->h;
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+            const tlsphi_material *other = tlsphi_material_of(s, s->neighbour[k]);
+            const double speeds = (double)(other->c_linear / m->c_linear);
+            stiffest = tlsphi_dmax(stiffest, (1 + (double)(other->rho / m->rho) * speeds * speeds) / 2);
+            h = tlsphi_dmax(h, (double)(m->h + other->h) / 2);
+        }
+        s->beside[2 * a] = (tlsph_real)(1 / sqrt(stiffest));
+        s->beside[2 * a + 1] = (tlsph_real)h;
+    }
+}
 static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
     const size_t D = (size_t)s->dim;
     size_t at = 0;
@@ -6862,6 +6893,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     tlsphi_fill_pairs(s, plan, list, g);
     tlsphi_fill_fourth(s, plan, list, g);
     tlsphi_fill_laplacian(s);
+    tlsphi_fill_interfaces(s);
     tlsphi_fill_fixes(s, plan);
     tlsphi_fill_mirrors(s, plan);
     tlsphi_fill_turns(s);
