@@ -5,10 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The schemes compared: those of the paper and the library's own. */
-enum { BONDS, KERNEL, PRINTED, OWN, SCHEMES, COURANTS = 3 };
-static const char *const scheme_keys[SCHEMES] = { "bonds", "kernel", "printed_force", "own" };
-static const double courants[COURANTS] = { 0.5, 0.7, 0.9 };
+/* The schemes compared: those of the paper, and the library's own with its dissipation, with sharp gradients, with JST. */
+enum { BONDS, KERNEL, PRINTED, OWN, OWN_SHARP, OWN_JST, SCHEMES };
+static const char *const scheme_keys[SCHEMES] = { "bonds", "kernel", "printed_force", "own", "own_sharp", "own_jst" };
 
 typedef struct study {
     bending_column_parameters p;
@@ -24,7 +23,7 @@ static bending_column_parameters scheme_parameters(const bending_column_paramete
     bending_column_parameters p = *given;
     if (scheme == KERNEL || scheme == PRINTED) p.options.operator_kind = (int)TLSPH_FIRST_KERNEL;
     if (scheme == PRINTED) p.options.force_form = (int)TLSPH_FORCE_AS_PRINTED;
-    if (scheme == OWN) {
+    if (scheme >= OWN) {
         scene_options_default(&p.options);
         p.options.operator_kind = (int)TLSPH_CELLS;
         p.options.integrator = given->options.integrator;
@@ -33,6 +32,9 @@ static bending_column_parameters scheme_parameters(const bending_column_paramete
         p.options.end_time = given->options.end_time;
         p.options.quiet = given->options.quiet;
         p.options.output = given->options.output;
+        p.options.sharp = scheme == OWN_SHARP;
+        if (scheme == OWN_JST) p.options.dissipation = (int)TLSPH_JST;
+        p.options.biharmonic = given->options.biharmonic;
         p.centred = 0; /* particles on the faces, its own placement */
     }
     return p;
@@ -79,18 +81,22 @@ static int run_scheme(study *s, int scheme) {
     return code == 3 ? 3 : 0;
 }
 
-/* 1 if the column keeps its energy within 5 % to t = 0.03 s at this Courant number. */
-static int is_stable(const study *s, int scheme, double cfl) {
+/* 1 if a column of 3 spacings keeps its energy within 5 % to t = 0.03 s at this Courant number. */
+static int is_stable(const study *s, int scheme, double biharmonic, double cfl) {
     bending_column_parameters p = scheme_parameters(&s->p, scheme);
     static bending_column column;
     tlsph_ledger before, now;
     int stable = 1;
+    p.n = 3;
     p.options.cfl = cfl;
+    p.options.biharmonic = biharmonic;
+    p.options.step_rule = scheme < OWN ? (int)TLSPH_STEP_BY_PAIR : (int)TLSPH_STEP_BY_PARTICLE;
+    p.options.integrator = (int)TLSPH_SSP_RK3;
     if (bending_column_create(&p, &column, NULL) != TLSPH_OK) return 0;
     tlsph_ledger_read(column.body.solver, &before);
     while (stable && tlsph_time(column.body.solver) < (tlsph_real)0.03) {
         stable = tlsph_step(column.body.solver, 1) == TLSPH_OK;
-        if (stable && tlsph_step_count(column.body.solver) % 20) continue;
+        if (stable && tlsph_step_count(column.body.solver) % 10) continue;
         tlsph_ledger_read(column.body.solver, &now);
         stable = stable && fabs(now.total_energy / before.total_energy - 1) < 0.05;
     }
@@ -98,16 +104,32 @@ static int is_stable(const study *s, int scheme, double cfl) {
     return stable;
 }
 
+/* The largest Courant number, to 0.02, at which a scheme is stable. What bounds it is linear: the fastest vibration of the
+   column with bonds, at its edges, has w = 2.73 c/d, of which three stages allow 1.73 (0.63, and 0.71 with the damping of
+   eta4 = 1/64, which the pair's step meets at 0.81 because r_ab falls to 0.87 d); the fastest decay of the JST term is
+   57 eta4 c/d, of which they allow 2.51 (0.35 at 1/8). */
+static double largest_stable(const study *s, int scheme, double biharmonic) {
+    double low = 0, high = 1;
+    while (high - low > 0.02) {
+        const double middle = (low + high) / 2;
+        if (is_stable(s, scheme, biharmonic, middle)) low = middle;
+        else high = middle;
+    }
+    return low;
+}
+
 static void report_stability(const study *s) {
-    char key[64];
-    for (int scheme = 0; scheme < SCHEMES; scheme++)
-        for (int i = 0; i < COURANTS; i++) {
-            const int stable = is_stable(s, scheme, courants[i]);
-            snprintf(key, sizeof key, "%s_stable_at_%.1f", scheme_keys[scheme], courants[i]);
-            /* the paper's 0.9 is not reached by its operators here; that of cells is stable there */
-            if (courants[i] < 0.8 || scheme == OWN) ex_check_true(key, stable);
-            else ex_result(key, stable, "1");
-        }
+    static const struct { const char *key; int scheme; double biharmonic, least, most; } rows[] = {
+        { "bonds_eta_1_64", BONDS, 1.0 / 64, 0.7, 0.88 }, { "bonds_eta_1_8", BONDS, 0.125, 0.3, 0.4 },
+        { "own", OWN, 1.0 / 64, 0.6, 1 } };
+    char key[80];
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const double cfl = largest_stable(s, rows[i].scheme, rows[i].biharmonic);
+        snprintf(key, sizeof key, "largest_stable_courant_number_%s", rows[i].key);
+        ex_result(key, cfl, "1");
+        snprintf(key, sizeof key, "stable_courant_number_%s", rows[i].key);
+        ex_check_true(key, cfl >= rows[i].least && cfl <= rows[i].most);
+    }
 }
 
 /* Table 1: initial spacing over the linear p speed, at 0.3 and 0.9. */
@@ -128,7 +150,8 @@ static void report_table(const study *s) {
 
 static void draw(study *s) {
     static const char *const names[3] = { "kinetic", "strain", "total" };
-    static const char *const schemes[SCHEMES] = { "bonds, JST", "kernel, JST", "printed force, JST", "cells, limited" };
+    static const char *const schemes[SCHEMES] = { "bonds, JST", "kernel, JST", "printed force, JST", "own, limited",
+                                                   "own, sharp gradients", "own, JST" };
     double *columns[SCHEMES][4];
     ex_curve energy[3], change[SCHEMES];
     const ex_curve *list[2] = { energy, change };
@@ -160,16 +183,25 @@ static void draw(study *s) {
     driver_render(&s->base, "column.png", &view, s->shots, 2, 2, 0.5 / s->p.n);
 }
 
+/* Figure 18: about 1 %. The paper does not tell at which time; to 0.1 s here. */
+static void check_loss(const study *s, int scheme) {
+    const driver_history *h = &s->history[scheme];
+    double *change = driver_column(h, 3);
+    char key[64];
+    snprintf(key, sizeof key, "%s_energy_loss", scheme_keys[scheme]);
+    if (change && s->p.options.end_time < 0.1001) ex_check(key, -change[h->count - 1], 0.5, 0.5);
+    free(change);
+}
+
 static int run_study(study *s) {
     int failed = 0;
     for (int scheme = SCHEMES - 1; scheme >= 0 && !failed; scheme--) failed = run_scheme(s, scheme); /* frames of BONDS stay */
     if (failed) return failed;
     draw(s);
     for (int i = 0; i < 2; i++) driver_snapshot_free(&s->shots[i]);
-    const driver_history *bonds = &s->history[BONDS];
-    double *change = driver_column(bonds, 3);
-    if (change) ex_check("bonds_energy_loss", -change[bonds->count - 1], 0.5, 0.5); /* figure 18: about 1 % */
-    free(change);
+    check_loss(s, BONDS);
+    check_loss(s, OWN_SHARP);
+    check_loss(s, OWN_JST);
     for (int i = 0; i < SCHEMES; i++) driver_history_free(&s->history[i]);
     report_table(s);
     if (s->stability) report_stability(s);

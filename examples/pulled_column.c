@@ -91,84 +91,166 @@ static int run_column(const pulled_column_parameters *p) {
 
 /* ---- study: elongation at failure by gradient, force and dissipation, beside the paper's ------------------------- */
 
-enum { OWN, BONDS, KERNEL, BONDS_PRINTED, KERNEL_PRINTED, FIRST_ORDER, LINEAR_STEP, SCHEMES, RATIOS = 2 };
-static const char *const scheme_keys[SCHEMES] = { "own", "bonds", "kernel", "bonds_printed_force", "kernel_printed_force",
-                                                  "bonds_first_order_dissipation", "bonds_linear_step" };
+enum { RATIOS = 2, OWN_ROWS = 4, STEP_ROWS = 6, MATRIX_ROWS = 12, ROWS = OWN_ROWS + MATRIX_ROWS + STEP_ROWS };
+enum { OWN_SET = 1, PAPER_SET = 2, MATRIX_SET = 4, STEP_SET = 8 };
+
+/* A row: what differs from the setting of 002 (or, `own`, from the library's), and to which sets it belongs. */
+typedef struct scheme_row {
+    char key[64];
+    int sets, own, gradient, force, dissipation, step, unknowns;
+    double cfl; /* 0: that of the command line */
+} scheme_row;
+
+static const scheme_row other_rows[OWN_ROWS + STEP_ROWS] = {
+    { "own", OWN_SET | PAPER_SET, 1, TLSPH_CORRECTED_KERNEL, TLSPH_ADJOINT, TLSPH_LIMITED, TLSPH_STEP_BY_PARTICLE, TLSPH_PF, 0 },
+    { "own_pFJ", OWN_SET, 1, TLSPH_CORRECTED_KERNEL, TLSPH_ADJOINT, TLSPH_LIMITED, TLSPH_STEP_BY_PARTICLE, TLSPH_PFJ, 0 },
+    { "own_first_order", OWN_SET, 1, TLSPH_CORRECTED_KERNEL, TLSPH_ADJOINT, TLSPH_FIRST_ORDER, TLSPH_STEP_BY_PARTICLE, TLSPH_PF, 0 },
+    { "own_jst", OWN_SET, 1, TLSPH_CORRECTED_KERNEL, TLSPH_ADJOINT, TLSPH_JST, TLSPH_STEP_BY_PARTICLE, TLSPH_PF, 0 },
+    /* the paper's step by the p speed of the undeformed body, which does not shorten when the column stiffens across */
+    { "bonds_linear_step_0.5", STEP_SET, 0, TLSPH_BOND, TLSPH_ADJOINT, TLSPH_JST, TLSPH_STEP_BY_PAIR_LINEAR, TLSPH_PF, 0.5 },
+    { "bonds_linear_step_0.9", STEP_SET | PAPER_SET, 0, TLSPH_BOND, TLSPH_ADJOINT, TLSPH_JST, TLSPH_STEP_BY_PAIR_LINEAR, TLSPH_PF, 0.9 },
+    { "kernel_linear_step_0.9", STEP_SET, 0, TLSPH_FIRST_KERNEL, TLSPH_ADJOINT, TLSPH_JST, TLSPH_STEP_BY_PAIR_LINEAR, TLSPH_PF, 0.9 },
+    { "bonds_pair_step_0.5", STEP_SET, 0, TLSPH_BOND, TLSPH_ADJOINT, TLSPH_JST, TLSPH_STEP_BY_PAIR, TLSPH_PF, 0.5 },
+    { "bonds_pair_step_0.9", STEP_SET, 0, TLSPH_BOND, TLSPH_ADJOINT, TLSPH_JST, TLSPH_STEP_BY_PAIR, TLSPH_PF, 0.9 },
+    { "bonds_printed_force_linear_step_0.9", STEP_SET, 0, TLSPH_BOND, TLSPH_FORCE_AS_PRINTED, TLSPH_JST, TLSPH_STEP_BY_PAIR_LINEAR, TLSPH_PF, 0.9 } };
+
+/* Own rows, then gradient x force x dissipation, then the paper's steps. */
+static scheme_row row_of(int i) {
+    static const char *const gradients[2] = { "kernel", "bonds" }, *const forces[2] = { "", "_printed_force" };
+    static const char *const dissipations[3] = { "", "_limited", "_first_order" }; /* the first: JST */
+    static const int dissipation_kinds[3] = { TLSPH_JST, TLSPH_LIMITED, TLSPH_FIRST_ORDER };
+    if (i < OWN_ROWS) return other_rows[i];
+    if (i >= OWN_ROWS + MATRIX_ROWS) return other_rows[i - MATRIX_ROWS];
+    const int m = i - OWN_ROWS, bonds = m % 2, printed = m / 2 % 2, damped = m / 4;
+    scheme_row row = { "", MATRIX_SET | (bonds && !damped ? PAPER_SET : 0), 0, bonds ? TLSPH_BOND : TLSPH_FIRST_KERNEL,
+                       printed ? TLSPH_FORCE_AS_PRINTED : TLSPH_ADJOINT, dissipation_kinds[damped], TLSPH_STEP_BY_PARTICLE,
+                       TLSPH_PF, 0 };
+    snprintf(row.key, sizeof row.key, "%s%s%s", gradients[bonds], forces[printed], dissipations[damped]);
+    return row;
+}
+
+static const int row_sets[] = { OWN_SET | MATRIX_SET | STEP_SET, OWN_SET, PAPER_SET, MATRIX_SET, STEP_SET };
 static const double ratios[RATIOS] = { 0.45, 0.495 };
 static const double paper[2][RATIOS] = { { 526.80, 464.50 }, { 421.90, 427.58 } }; /* figure 20: bonds, JST-SPH */
 
-static pulled_column_parameters scheme_parameters(const pulled_column_parameters *given, int scheme, double poisson) {
+typedef struct study_options { int on, set, ratio; double seconds; const char *row; } study_options;
+
+static pulled_column_parameters row_parameters(const pulled_column_parameters *given, const scheme_row *row, double poisson) {
     pulled_column_parameters p = *given;
     p.poisson = poisson;
-    if (scheme == OWN) return p;
-    scene_options_of_002(&p.options, 1.0 / 64);
-    p.centred = 1;
-    if (scheme == KERNEL || scheme == KERNEL_PRINTED) p.options.operator_kind = TLSPH_FIRST_KERNEL;
-    if (scheme == BONDS_PRINTED || scheme == KERNEL_PRINTED) p.options.force_form = TLSPH_FORCE_AS_PRINTED;
-    /* the paper's step by the p speed of the undeformed body, which does not shorten when the column stiffens across */
-    if (scheme == LINEAR_STEP) p.options.step_rule = TLSPH_STEP_BY_PAIR_LINEAR;
-    if (scheme == FIRST_ORDER) p.options.dissipation = TLSPH_FIRST_ORDER;
+    p.centred = !row->own;
+    if (!row->own) scene_options_of_002(&p.options, 1.0 / 64);
+    p.options.biharmonic = 1.0 / 64;
+    p.options.operator_kind = row->gradient;
+    p.options.force_form = row->force;
+    p.options.dissipation = row->dissipation;
+    p.options.step_rule = row->step;
+    p.options.unknowns = row->unknowns;
+    if (row->cfl > 0) p.options.cfl = row->cfl;
     return p;
 }
 
-/* Elongation at failure, or at the end of the pull, percent. */
-static double elongation_of(const pulled_column_parameters *p, int *failed) {
+/* What became of a run: it reached the end, failed, or used up its processor time. */
+typedef enum outcome { REACHED, FAILED, OUT_OF_TIME } outcome;
+
+static outcome elongation_of(const pulled_column_parameters *p, double seconds, double *elongation) {
     static pulled_column column;
+    const double end = pulled_column_end(p), began = ex_cpu_seconds();
+    outcome what = REACHED;
     tlsph_error error;
-    *failed = 1;
-    if (pulled_column_create(p, &column, &error) != TLSPH_OK) { driver_error(&error); return 0; }
-    *failed = tlsph_advance(column.body.solver, (tlsph_real)pulled_column_end(p)) != TLSPH_OK;
-    const double elongation = pulled_column_elongation(&column);
+    *elongation = 0;
+    if (pulled_column_create(p, &column, &error) != TLSPH_OK) { driver_error(&error); return FAILED; }
+    while (what == REACHED && end - (double)tlsph_time(column.body.solver) > 1e-10 * end) {
+        if (tlsph_step(column.body.solver, (tlsph_real)(end - (double)tlsph_time(column.body.solver))) != TLSPH_OK) what = FAILED;
+        else if (seconds > 0 && ex_cpu_seconds() - began > seconds) what = OUT_OF_TIME;
+    }
+    *elongation = pulled_column_elongation(&column);
     scene_destroy(&column.body);
-    return elongation;
+    return what;
 }
 
-static int run_study(const pulled_column_parameters *given) {
-    static double reached[RATIOS][SCHEMES], place[SCHEMES], paper_place[2] = { BONDS, KERNEL };
-    double published[RATIOS][2];
-    ex_curve curves[2 * RATIOS];
+static void draw_study(const char *folder, const double *place, double reached[RATIOS][ROWS], int count) {
+    static double x[2][2], levels[RATIOS][2][2];
+    static const char *const names[4] = { "paper, bonds, 0.45", "paper, JST-SPH, 0.45", "paper, bonds, 0.495", "paper, JST-SPH, 0.495" };
+    ex_curve curves[3 * RATIOS];
     ex_axes axes;
-    const char *folder = given->options.output[0] ? given->options.output : "out/pulled_column";
-    char key[96], path[600];
-    for (int r = 0; r < RATIOS; r++)
-        for (int scheme = 0; scheme < SCHEMES; scheme++) {
-            const pulled_column_parameters p = scheme_parameters(given, scheme, ratios[r]);
-            int failed;
-            place[scheme] = scheme;
-            reached[r][scheme] = elongation_of(&p, &failed);
-            snprintf(key, sizeof key, "elongation_%s_%g%s", scheme_keys[scheme], ratios[r], failed ? "" : "_at_least");
-            ex_result(key, reached[r][scheme], "percent");
-            if (scheme == OWN) ex_check_true(r ? "own_reaches_the_end_0.495" : "own_reaches_the_end_0.45", !failed);
-        }
+    char path[600];
     for (int r = 0; r < RATIOS; r++) {
-        for (int i = 0; i < 2; i++) published[r][i] = paper[i][r];
-        const ex_curve here = { r ? "nu = 0.495" : "nu = 0.45", place, reached[r], SCHEMES, 2, r };
-        const ex_curve there = { r ? "paper, 0.495" : "paper, 0.45", paper_place, published[r], 2, 2, 2 + r };
-        curves[2 * r] = here;
-        curves[2 * r + 1] = there;
+        const ex_curve here = { r ? "nu = 0.495" : "nu = 0.45", place, reached[r], (size_t)count, 2, r };
+        curves[3 * r] = here;
+        for (int i = 0; i < 2; i++) {
+            x[i][0] = 0; x[i][1] = count - 1;
+            levels[r][i][0] = levels[r][i][1] = paper[i][r];
+            const ex_curve there = { names[2 * r + i], x[i], levels[r][i], 2, i, 2 + 2 * r };
+            curves[3 * r + 1 + i] = there;
+        }
     }
     memset(&axes, 0, sizeof axes);
     axes.title = "elongation at failure or end";
-    axes.x_label = "0 own, 1 bonds, 2 kernel, 3, 4 printed forces, 5 first order, 6 linear step";
+    axes.x_label = "row of the study, as printed";
     axes.y_label = "[%]";
-    if (ex_make_directory(folder)) return 1;
     snprintf(path, sizeof path, "%s/study.png", folder);
-    ex_plot(path, 720, 460, &axes, curves, 2 * RATIOS);
+    ex_plot(path, 760, 480, &axes, curves, 3 * RATIOS);
+}
+
+static int is_chosen(const study_options *study, const scheme_row *row) {
+    return study->row[0] ? !strcmp(study->row, row->key) : row->sets & row_sets[study->set];
+}
+
+static int unknown_row(const study_options *study) {
+    fprintf(stderr, "pulled_column: --row has the value '%s'; allowed is", study->row);
+    for (int i = 0; i < ROWS; i++) fprintf(stderr, " %s", row_of(i).key);
+    fprintf(stderr, "\n");
+    return 2;
+}
+
+/* Prints each run as soon as it is done: the elongation at failure, at the end (at least), or when its time was up. */
+static int run_study(const pulled_column_parameters *given, const study_options *study) {
+    static const char *const suffix[3] = { "_at_least", "", "_out_of_time" };
+    static double reached[RATIOS][ROWS], place[ROWS];
+    const char *folder = given->options.output[0] ? given->options.output : "out/pulled_column";
+    int count = 0;
+    char key[96];
+    for (int i = 0; i < ROWS; i++) {
+        const scheme_row row = row_of(i);
+        if (!is_chosen(study, &row)) continue;
+        for (int r = 0; r < RATIOS; r++) {
+            if (study->ratio && study->ratio != r + 1) continue;
+            const pulled_column_parameters p = row_parameters(given, &row, ratios[r]);
+            const double began = ex_cpu_seconds();
+            const outcome what = elongation_of(&p, study->seconds, &reached[r][count]);
+            snprintf(key, sizeof key, "elongation_%s_%g%s", row.key, ratios[r], suffix[what]);
+            ex_result(key, reached[r][count], "percent");
+            if (!given->options.quiet) fprintf(stderr, "%s: %.0f s\n", key, ex_cpu_seconds() - began);
+            if (i == 0) ex_check_true(r ? "own_does_not_fail_0.495" : "own_does_not_fail_0.45", what != FAILED);
+        }
+        place[count] = count;
+        count++;
+    }
+    if (!count) return unknown_row(study);
+    if (ex_make_directory(folder)) return 1;
+    draw_study(folder, place, reached, count);
     return ex_exit_code();
 }
 
 int main(int argc, char **argv) {
     pulled_column_parameters p;
-    int study = 0;
+    study_options study = { 0, 0, 0, 0, "" };
     const ex_option own[] = {
         { "n", EX_INT, &p.n, NULL, NULL, 2, 64, "spacings across the width of 1 m; 002: 12, centred" },
         { "nu", EX_REAL, &p.poisson, NULL, NULL, -0.9, 0.49999, "Poisson's ratio; 002: 0.45 and 0.495" },
         { "elongation", EX_REAL, &p.elongation, "percent", NULL, 1, 1e5, "at which the pull ends" },
         { "speed", EX_REAL, &p.speed, "m/s", NULL, 1e-3, 1e4, "of the head" },
         { "placement", EX_CHOICE, &p.centred, NULL, "faces|centred", 0, 0, "particles on faces or at cell centres" },
-        { "study", EX_FLAG, &study, NULL, NULL, 0, 0, "elongation at failure of seven schemes at nu = 0.45 and 0.495; minutes" } };
+        { "study", EX_FLAG, &study.on, NULL, NULL, 0, 0, "elongation at failure of many schemes at nu = 0.45 and 0.495; minutes" },
+        { "rows", EX_CHOICE, &study.set, NULL, "all|own|paper|matrix|step", 0, 0,
+          "of the study; matrix: gradient x force x dissipation; step: the paper's time steps" },
+        { "ratio", EX_CHOICE, &study.ratio, NULL, "both|0.45|0.495", 0, 0, "Poisson's ratios of the study" },
+        { "quarter", EX_INT, &p.quarter, NULL, NULL, 0, 1, "1: a quarter of the section between rollers (even n, faces)" },
+        { "row", EX_TEXT, &study.row, NULL, NULL, 0, 0, "one row of the study by its name" },
+        { "seconds", EX_REAL, &study.seconds, "s", NULL, 0, 1e6, "processor time after which a run of the study is given up; 0: none" } };
     pulled_column_default(&p);
     driver_arguments(argc, argv, "pulled_column", "column pulled until it fails (002 section 5.4)", &p.options, own,
                      (int)(sizeof own / sizeof *own));
-    return study ? run_study(&p) : run_column(&p);
+    return study.on ? run_study(&p, &study) : run_column(&p);
 }

@@ -6,7 +6,8 @@
 #include <string.h>
 
 /* A row of figure 9 (supports x kernels), and below it what the library has beyond the paper. */
-enum { SUPPORTS = 4, ROWS = 2 * SUPPORTS + 2, LEVELS = 4 };
+enum { SUPPORTS = 4, BEYOND = 3, ROWS = 2 * SUPPORTS + BEYOND, LEVELS = 4 };
+static const char *const beyond[BEYOND] = { "limited", "sharp", "cells4" };
 static const double supports[SUPPORTS] = { 0.6, 0.9, 1.2, 1.5 };
 
 typedef struct study {
@@ -20,7 +21,7 @@ typedef struct study {
 
 static void row_name(int row, char *name, size_t size) {
     if (row < 2 * SUPPORTS) snprintf(name, size, "W%d_%.1f", row / SUPPORTS, supports[row % SUPPORTS]);
-    else snprintf(name, size, row == 2 * SUPPORTS ? "limited" : "sharp");
+    else snprintf(name, size, "%s", beyond[row - 2 * SUPPORTS]);
 }
 
 /* The scene of a row: the paper's operators with JST, or cells with the limited dissipation. */
@@ -33,7 +34,7 @@ static swinging_plate_parameters row_parameters(const study *s, int row, int lev
                                            : (int)(first ? TLSPH_FIRST_KERNEL : TLSPH_ZEROTH_KERNEL);
         p.options.support = supports[row % SUPPORTS];
     } else {
-        p.options.operator_kind = (int)TLSPH_CELLS;
+        p.options.operator_kind = row == 2 * SUPPORTS + 2 ? (int)TLSPH_CELLS_4 : (int)TLSPH_CELLS;
         p.options.support = 0.9; /* of the interpolation only */
         p.options.dissipation = (int)TLSPH_LIMITED;
         p.options.sharp = row == 2 * SUPPORTS + 1;
@@ -85,9 +86,9 @@ static double order(const study *s, int row, int quantity) {
 static void draw_orders(const study *s, const char *path) {
     static const char *const titles[4] = { "displacement, L2, first order", "gradient, H1, first order",
                                            "displacement, L2, zeroth order", "gradient, H1, zeroth order" };
-    static double d[LEVELS], y[4][SUPPORTS + 2][LEVELS];
-    static char names[SUPPORTS + 2][24];
-    ex_curve curves[4][SUPPORTS + 2];
+    static double d[LEVELS], y[4][SUPPORTS + BEYOND][LEVELS];
+    static char names[SUPPORTS + BEYOND][24];
+    ex_curve curves[4][SUPPORTS + BEYOND];
     const ex_curve *list[4];
     int counts[4];
     ex_axes axes[4];
@@ -99,15 +100,15 @@ static void draw_orders(const study *s, const char *path) {
         axes[panel].y_label = "relative error";
         axes[panel].log_x = axes[panel].log_y = 1;
         list[panel] = curves[panel];
-        counts[panel] = SUPPORTS + 2;
-        for (int i = 0; i < SUPPORTS + 2; i++) {
+        counts[panel] = SUPPORTS + BEYOND;
+        for (int i = 0; i < SUPPORTS + BEYOND; i++) {
             const int row = i < SUPPORTS ? (panel < 2 ? SUPPORTS : 0) + i : SUPPORTS + i;
             for (int l = 0; l < s->levels; l++) {
                 const plate_errors *e = &s->errors[row][l];
                 y[panel][i][l] = panel % 2 ? (i < SUPPORTS ? e->H1 : e->H1_particles) : i < SUPPORTS ? e->L2 : e->L2_particles;
             }
             if (i < SUPPORTS) snprintf(names[i], sizeof names[i], "beta = %.1f", supports[i]);
-            else snprintf(names[i], sizeof names[i], i == SUPPORTS ? "cells (particles)" : "sharp (particles)");
+            else snprintf(names[i], sizeof names[i], "%s (particles)", beyond[i - SUPPORTS]);
             const ex_curve curve = { names[i], d, y[panel][i], (size_t)s->levels, i < SUPPORTS ? 3 : 1, i };
             curves[panel][i] = curve;
         }
@@ -130,6 +131,26 @@ static void draw_fields(study *s) {
     for (int i = 0; i < 6; i++) driver_snapshot_free(&s->shots[i]);
 }
 
+/* Figure 9: order 2 in L2, 0.9 to 1.2 in H1. With the smallest support (44) and (45) measure their own interpolation: 1.2
+   spacings about a point between particles hold four or five of them, and interpolating the exact displacements gives the
+   same errors, order 0.5 to 1.2 with W0 in L2 and 0.9 to 1.1 with W1 in H1 over many halvings. There the order at
+   the particles is asked for. */
+static void check_row(const study *s, int row) {
+    const plate_errors *e = &s->errors[row][s->levels - 1];
+    char name[24], key[64];
+    const int narrow = row % SUPPORTS == 0;
+    row_name(row, name, sizeof name);
+    snprintf(key, sizeof key, "%s_order_%s_at_least_1.9", name, narrow ? "u" : "L2");
+    ex_check_true(key, order(s, row, narrow ? 2 : 0) >= 1.9);
+    snprintf(key, sizeof key, "%s_order_%s_at_least_1.0", name, narrow ? "F" : "H1");
+    ex_check_true(key, order(s, row, narrow ? 3 : 1) >= 1.0);
+    if (!narrow || s->p.n << (s->levels - 1) < 20) return;
+    snprintf(key, sizeof key, "%s_H1_by_that_of_interpolation", name);
+    ex_check(key, e->H1 / e->H1_exact, 1, 0.1);
+    snprintf(key, sizeof key, "%s_L2_by_that_of_interpolation", name);
+    if (row == 0) ex_check(key, e->L2 / e->L2_exact, 1, 0.1);
+}
+
 static void report(const study *s) {
     static const char *const what[4] = { "L2", "H1", "u", "F" };
     char name[24], key[64];
@@ -143,19 +164,11 @@ static void report(const study *s) {
             ex_result(key, order(s, row, i), "1");
         }
     if (!s->bonds || !s->p.linear) return;
-    for (int row = 0; row < 2 * SUPPORTS; row++) { /* figure 9: 2 in L2, 0.9 to 1.2 in H1 */
-        row_name(row, name, sizeof name);
-        if (row % SUPPORTS == 0) { /* support of 1.2 spacings: between particles W0 is not exact for linear fields, order 1 */
-            snprintf(key, sizeof key, "%s_order_H1_at_least_0.9", name);
-            ex_check_true(key, order(s, row, 1) >= 0.9);
-            snprintf(key, sizeof key, "%s_order_L2_at_least_%s", name, row ? "1.9" : "1.0");
-            ex_check_true(key, order(s, row, 0) >= (row ? 1.9 : 1.0));
-            continue;
-        }
-        snprintf(key, sizeof key, "%s_order_L2_at_least_1.9", name);
-        ex_check_true(key, order(s, row, 0) >= 1.9);
-        snprintf(key, sizeof key, "%s_order_H1_at_least_1.0", name);
-        ex_check_true(key, order(s, row, 1) >= 1.0);
+    for (int row = 0; row < 2 * SUPPORTS; row++) check_row(s, row);
+    const double cells = s->errors[2 * SUPPORTS][last].H1_particles;
+    for (int i = 1; i < BEYOND; i++) { /* beyond the paper: fourth order in dispersion; measured at n = 24: 0.07 and 0.34 */
+        snprintf(key, sizeof key, "%s_gradient_by_that_of_cells", beyond[i]);
+        ex_check_below(key, s->errors[2 * SUPPORTS + i][last].H1_particles / cells, i == 1 ? 0.15 : 0.5);
     }
 }
 

@@ -78,6 +78,28 @@ TEST(slow_plate_orders_at_the_spacings_of_the_paper) {
     check_orders(TLSPH_FIRST_KERNEL, 1.2, 10);
 }
 
+/* With a support of 1.2 spacings (44) and (45) measure how the kernels interpolate between particles, whatever the scheme. */
+TEST(narrow_supports_measure_their_interpolation) {
+    DOUBLE_ONLY();
+    for (int first = 0; first < 2; first++) {
+        swinging_plate_parameters p;
+        swinging_plate plate;
+        plate_errors e;
+        swinging_plate_default(&p);
+        scene_options_of_002(&p.options, 0.125);
+        p.options.operator_kind = (int)(first ? TLSPH_BOND : TLSPH_ZEROTH_BOND);
+        p.options.support = 0.6;
+        p.options.projection = 1;
+        REQUIRE_OK(swinging_plate_create(&p, &plate, NULL));
+        CHECK_RESULT(tlsph_advance(plate.body.solver, R(SCENE_PI / 2 / plate.omega)), TLSPH_OK);
+        swinging_plate_errors(&plate, 1, &e);
+        scene_destroy(&plate.body);
+        CHECK_CLOSE(e.H1 / e.H1_exact, 1, 0.05);
+        CHECK(e.H1_particles < e.H1 / 5);
+        if (!first) CHECK_CLOSE(e.L2 / e.L2_exact, 1, 0.05);
+    }
+}
+
 /* ---- momenta of free bodies ---- */
 
 static double angular_loss(int dimension, int n, int projection, double end, double *linear) {
@@ -147,6 +169,38 @@ TEST(bending_column_loses_what_jst_takes) {
     CHECK(rest_printed > 1e-3);
 }
 
+/* The step of bonds with JST is bounded by the fastest decay of the biharmonic term, 57 eta4 c/d, of which three stages allow
+   2.51: Courant number 0.35 at 1/8. At 1/64 the fastest vibration, 2.73 c/d at the edges, bounds it: 0.71. */
+static double energy_by_courant(double biharmonic, double cfl) {
+    bending_column_parameters p;
+    static bending_column column;
+    tlsph_ledger before, now;
+    double share = 1;
+    bending_column_default(&p);
+    p.options.biharmonic = biharmonic;
+    p.options.step_rule = (int)TLSPH_STEP_BY_PAIR;
+    p.options.cfl = cfl;
+    p.n = 3;
+    if (!CHECK_RESULT(bending_column_create(&p, &column, NULL), TLSPH_OK)) return HUGE_VAL;
+    tlsph_ledger_read(column.body.solver, &before);
+    while (share < 10 && (double)tlsph_time(column.body.solver) < 0.02) {
+        if (tlsph_step(column.body.solver, 1) != TLSPH_OK) break;
+        tlsph_ledger_read(column.body.solver, &now);
+        share = now.total_energy / before.total_energy;
+    }
+    if ((double)tlsph_time(column.body.solver) < 0.02) share = HUGE_VAL;
+    scene_destroy(&column.body);
+    return share;
+}
+
+TEST(jst_bounds_the_step) {
+    DOUBLE_ONLY();
+    CHECK_CLOSE(energy_by_courant(0.125, 0.3), 1, 0.02);
+    CHECK(energy_by_courant(0.125, 0.45) > 2);
+    CHECK_CLOSE(energy_by_courant(1.0 / 64, 0.7), 1, 0.02);
+    CHECK(energy_by_courant(1.0 / 64, 0.95) > 2);
+}
+
 /* ---- pulled column ---- */
 
 /* 002 section 5.4 asks how far the column goes. With its own time step, by the p speed of the undeformed body, bonds with
@@ -175,5 +229,6 @@ TEST(pulled_column_fails_by_the_linear_step) {
 }
 
 SUITE(physics_bonds, ENTRY(pulled_column_fails_by_the_linear_step), ENTRY(bonds_need_the_particle_itself), ENTRY(bonds_lower_the_plateau_of_a_fixed_support),
+      ENTRY(narrow_supports_measure_their_interpolation), ENTRY(jst_bounds_the_step),
       ENTRY(plate_orders_of_bonds), ENTRY(slow_plate_orders_at_the_spacings_of_the_paper), ENTRY(spinning_bodies_keep_their_momenta),
       ENTRY(bending_column_loses_what_jst_takes))

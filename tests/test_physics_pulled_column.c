@@ -35,6 +35,31 @@ TEST(a_pulled_column_follows_a_bar) {
     CHECK_CLOSE(centred, 1, 0.15);
 }
 
+/* Between rollers a quarter of the section moves as the whole does. */
+TEST(a_quarter_of_the_column_moves_as_the_whole) {
+    double strain[2], kinetic[2], steps[2];
+    DOUBLE_ONLY();
+    for (int quarter = 0; quarter < 2; quarter++) {
+        pulled_column_parameters p;
+        pulled_column column;
+        tlsph_ledger ledger;
+        pulled_column_default(&p);
+        p.n = 2;
+        p.quarter = quarter;
+        p.elongation = 40;
+        REQUIRE_OK(pulled_column_create(&p, &column, NULL));
+        CHECK_RESULT(tlsph_advance(column.body.solver, R(pulled_column_end(&p))), TLSPH_OK);
+        tlsph_ledger_read(column.body.solver, &ledger);
+        scene_destroy(&column.body);
+        strain[quarter] = ledger.strain_energy;
+        kinetic[quarter] = ledger.kinetic_energy;
+        steps[quarter] = (double)ledger.step;
+    }
+    CHECK_CLOSE(4 * strain[1] / strain[0], 1, 1e-9);
+    CHECK_CLOSE(4 * kinetic[1] / kinetic[0], 1, 1e-9);
+    CHECK_CLOSE(steps[1], steps[0], 0);
+}
+
 TEST(slow_full_set_holds_where_pF_holds) {
     DOUBLE_ONLY();
     for (int i = 0; i < 2; i++) {
@@ -46,4 +71,5 @@ TEST(slow_full_set_holds_where_pF_holds) {
     }
 }
 
-SUITE(physics_pulled_column, ENTRY(a_pulled_column_follows_a_bar), ENTRY(slow_full_set_holds_where_pF_holds))
+SUITE(physics_pulled_column, ENTRY(a_pulled_column_follows_a_bar), ENTRY(a_quarter_of_the_column_moves_as_the_whole),
+      ENTRY(slow_full_set_holds_where_pF_holds))

@@ -29,6 +29,7 @@ double pulled_column_end(const pulled_column_parameters *p) {
 
 tlsph_result pulled_column_create(const pulled_column_parameters *p, pulled_column *out, tlsph_error *error) {
     const double first = p->centred ? width / p->n / 2 : 0; /* height of the lowest particles */
+    const int quarter = p->quarter && !p->centred && p->n % 2 == 0;
     tlsph_material material = tlsph_material_default(TLSPH_NEO_HOOKEAN);
     tlsph_fill fill = tlsph_fill_default(3);
     tlsph_condition *pull;
@@ -39,8 +40,8 @@ tlsph_result pulled_column_create(const pulled_column_parameters *p, pulled_colu
     material.density = 1100;
     material.young = 17000000;
     material.poisson = (tlsph_real)p->poisson;
-    fill.origin[0] = fill.origin[1] = (tlsph_real)(-width / 2);
-    fill.size[0] = fill.size[1] = (tlsph_real)width;
+    fill.origin[0] = fill.origin[1] = (tlsph_real)(quarter ? 0 : -width / 2);
+    fill.size[0] = fill.size[1] = (tlsph_real)(quarter ? width / 2 : width);
     fill.size[2] = (tlsph_real)length;
     fill.spacing = (tlsph_real)(width / p->n);
     fill.placement = p->centred ? TLSPH_CELL_CENTRED : TLSPH_ON_FACES;
@@ -49,6 +50,8 @@ tlsph_result pulled_column_create(const pulled_column_parameters *p, pulled_colu
     pull = scene_add_plane(&setup, TLSPH_VELOCITY, 2, length - first);
     pull->value[2] = (tlsph_real)p->speed;
     memset(pull->normal, 0, sizeof pull->normal); /* the head is held sideways too */
+    for (int axis = 0; quarter && axis < 2; axis++) scene_add_plane(&setup, TLSPH_ROLLER, axis, 0);
+    out->parameters.quarter = quarter;
     result = scene_end(&setup, &p->options, &out->body, error);
     if (result == TLSPH_OK) out->tip = scene_nearest(&out->body.cloud.particles, 0, 0, length);
     else scene_destroy(&out->body);
@@ -68,9 +71,10 @@ double pulled_column_force(const pulled_column *column) {
     const double spacing = width / column->parameters.n, layer = (column->parameters.centred ? 1.5 : 1) * spacing;
     tlsph_real *P = scene_read(column->body.solver, TLSPH_FIELD_STRESS);
     double force = 0;
+    const double share = column->parameters.quarter ? 4 : 1;
     for (size_t a = 0; P && a < particles->count; a++)
         if (fabs((double)particles->positions[3 * a + 2] - layer) < 0.1 * spacing)
-            force += (double)P[9 * a + 8] * (double)particles->volumes[a] / spacing;
+            force += share * (double)P[9 * a + 8] * (double)particles->volumes[a] / spacing;
     free(P);
     return force;
 }

@@ -315,6 +315,7 @@ double scene_oscillation_of(const tlsph_solver *solver, const tlsph_real *values
 typedef struct twisting_column_parameters {
     scene_options options;
     int n;                /* spacings across 1 m */
+    int centred;          /* 1: particles at the centres of cells, as n x n x 6n in 002; 0: on the faces */
     double nu;            /* Poisson's ratio */
     double omega;         /* rad/s, of the initial angular velocity at the top */
 } twisting_column_parameters;
@@ -484,11 +485,13 @@ typedef struct swinging_plate {
 } swinging_plate;
 
 /* Errors of the displacement and its gradient: integrals over the plate by their exact values. */
-/* Six doubles in this order. */
+/* Eight doubles in this order. */
 typedef struct plate_errors {
     double L2, H1;               /* of the kernels' interpolation, by 10 x 10 tiles of 5 x 5 Gauss points (002-44, 45) */
     double L2_particles, H1_particles; /* sums over the particles, of u and F */
     double velocity, stress;     /* the same of v and P */
+    double L2_exact, H1_exact;   /* L2 and H1 of the kernels' interpolation of the exact displacements: what (44), (45) show of a
+                                    scheme without error */
 } plate_errors;
 
 void swinging_plate_default(swinging_plate_parameters *parameters);
@@ -578,6 +581,7 @@ typedef struct pulled_column_parameters {
     scene_options options;   /* end_time 0: from `elongation` */
     int n;                   /* spacings across the width of 1 m, 6 n along the length of 6 m */
     int centred;             /* 1: particles at cell centres (n x n x 6n, as in 002), 0: on the faces */
+    int quarter;             /* 1: a quarter of the section between rollers, for even n with particles on the faces */
     double poisson, speed;   /* m/s, of the driven end */
     double elongation;       /* at which the pull ends, percent */
 } pulled_column_parameters;

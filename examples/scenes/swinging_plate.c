@@ -153,7 +153,8 @@ void swinging_plate_errors(const swinging_plate *plate, int integrals, plate_err
     static const tlsph_field fields[4] = { TLSPH_FIELD_DISPLACEMENT, TLSPH_FIELD_F, TLSPH_FIELD_VELOCITY, TLSPH_FIELD_STRESS };
     const tlsph_particles *particles = &plate->body.cloud.particles;
     const double t = (double)tlsph_time(plate->body.solver);
-    double *u = malloc(3 * particles->count * sizeof *u), sums[6][2] = { { 0 } }, out[6];
+    double *u = malloc(6 * particles->count * sizeof *u), sums[8][2] = { { 0 } }, out[8];
+    double *exact_u = u ? u + 3 * particles->count : NULL;
     tlsph_real *read[4];
     for (int f = 0; f < 4; f++) read[f] = scene_read(plate->body.solver, fields[f]);
     for (size_t a = 0; a < particles->count; a++) {
@@ -164,11 +165,17 @@ void swinging_plate_errors(const swinging_plate *plate, int integrals, plate_err
             const int count = f % 2 ? 9 : 3;
             add_squares(read[f] ? read[f] + (size_t)count * a : NULL, values[f], count, f == 1, volume, sums[2 + f]);
         }
-        for (int i = 0; u && read[0] && i < 3; i++) u[3 * a + (size_t)i] = (double)read[0][3 * a + (size_t)i];
+        for (int i = 0; u && read[0] && i < 3; i++) {
+            u[3 * a + (size_t)i] = (double)read[0][3 * a + (size_t)i];
+            exact_u[3 * a + (size_t)i] = exact[i];
+        }
     }
-    if (integrals && u && read[0]) gauss_errors(plate, u, t, sums);
-    for (int i = 0; i < 6; i++) out[i] = sums[i][1] > 0 ? sqrt(sums[i][0] / sums[i][1]) : HUGE_VAL;
-    const plate_errors all = { out[0], out[1], out[2], out[3], out[4], out[5] };
+    if (integrals && u && read[0]) {
+        gauss_errors(plate, u, t, sums);
+        gauss_errors(plate, exact_u, t, sums + 6);
+    }
+    for (int i = 0; i < 8; i++) out[i] = sums[i][1] > 0 ? sqrt(sums[i][0] / sums[i][1]) : HUGE_VAL;
+    const plate_errors all = { out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7] };
     *errors = all;
     for (int f = 0; f < 4; f++) free(read[f]);
     free(u);

@@ -44,8 +44,9 @@ tlsph_result twisting_column_create(const twisting_column_parameters *p, twistin
     fill.size[1] = (tlsph_real)LENGTH;
     fill.origin[0] = fill.origin[2] = (tlsph_real)-0.5;
     fill.spacing = (tlsph_real)(1.0 / p->n);
+    fill.placement = p->centred ? TLSPH_CELL_CENTRED : TLSPH_ON_FACES;
     scene_begin(&setup, &fill, &material, error);
-    scene_add_plane(&setup, TLSPH_CLAMPED, 1, 0);
+    scene_add_plane(&setup, TLSPH_CLAMPED, 1, p->centred ? 0.5 / p->n : 0);
     result = scene_end(&setup, &p->options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, initial_state);
     if (result != TLSPH_OK) scene_destroy(&out->body);
@@ -56,11 +57,12 @@ void twisting_column_read(const twisting_column *column, twisting_column_shape *
     const tlsph_particles *particles = &column->body.cloud.particles;
     tlsph_real *x = scene_read(column->body.solver, TLSPH_FIELD_POSITION);
     tlsph_real *v = scene_read(column->body.solver, TLSPH_FIELD_VELOCITY);
+    const double top = LENGTH - (column->parameters.centred ? 0.5 / column->parameters.n : 0);
     double volume = 0, height = 0, cosine = 0, sine = 0, axis[2] = { 0 }, axis_velocity[2] = { 0 };
     for (size_t i = 0; x && v && i < particles->count; i++) {
         const tlsph_real *X = particles->positions + 3 * i, *xi = x + 3 * i;
         const double V = (double)particles->volumes[i];
-        if ((double)X[1] < LENGTH * (1 - 1e-5)) continue; /* below the top face */
+        if ((double)X[1] < top * (1 - 1e-5)) continue; /* below the topmost layer */
         volume += V;
         height += V * (double)xi[1];
         cosine += V * ((double)X[0] * (double)xi[0] + (double)X[2] * (double)xi[2]);
