@@ -60,6 +60,31 @@ TEST(a_quarter_of_the_column_moves_as_the_whole) {
     CHECK_CLOSE(steps[1], steps[0], 0);
 }
 
+/* The scheme of 002 with the step (31) by the undeformed body's p speed: what it reaches is where the step is too long for the
+   current speed across the column. By current speeds the same scheme goes on (test_physics_bonds.c). */
+TEST(slow_linear_step_fails_where_the_column_has_stiffened) {
+    static const double cfl[2] = { 0.6, 0.75 };
+    double reached[2];
+    DOUBLE_ONLY();
+    for (int i = 0; i < 2; i++) {
+        pulled_column_parameters p;
+        static pulled_column column;
+        pulled_column_default(&p);
+        scene_options_of_002(&p.options, 1.0 / 64);
+        p.options.cfl = cfl[i];
+        p.options.step_rule = (int)TLSPH_STEP_BY_PAIR_LINEAR;
+        p.centred = 1;
+        p.n = 3;
+        p.elongation = 500;
+        REQUIRE_OK(pulled_column_create(&p, &column, NULL));
+        CHECK_RESULT(tlsph_advance(column.body.solver, R(pulled_column_end(&p))), TLSPH_ERROR_INVERSION);
+        reached[i] = pulled_column_elongation(&column);
+        CHECK_CLOSE(cfl[i] * pulled_column_stiffening(&column.body.material, 1 + reached[i] / 100), 0.94, 0.05);
+        scene_destroy(&column.body);
+    }
+    REPORT("%.0f %%, %.0f %%", reached[0], reached[1]);
+}
+
 TEST(slow_full_set_holds_where_pF_holds) {
     DOUBLE_ONLY();
     for (int i = 0; i < 2; i++) {
@@ -72,4 +97,5 @@ TEST(slow_full_set_holds_where_pF_holds) {
 }
 
 SUITE(physics_pulled_column, ENTRY(a_pulled_column_follows_a_bar), ENTRY(a_quarter_of_the_column_moves_as_the_whole),
+      ENTRY(slow_linear_step_fails_where_the_column_has_stiffened),
       ENTRY(slow_full_set_holds_where_pF_holds))

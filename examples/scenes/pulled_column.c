@@ -79,15 +79,28 @@ double pulled_column_force(const pulled_column *column) {
     return force;
 }
 
-double pulled_column_bar_force(const tlsph_material *material, double stretch) {
-    double p_wave, bulk, shear, low = 1e-3, high = 3;
-    scene_moduli(material, &p_wave, &bulk, &shear);
+/* Stretch of the sides of a homogeneous bar, from P = 0 there. */
+static double side_stretch(double bulk, double shear, double stretch) {
+    double low = 1e-3, high = 3;
     for (int i = 0; i < 60; i++) {
         const double b = sqrt(low * high), J = stretch * b * b, FF = stretch * stretch + 2 * b * b;
         const double side = shear * pow(J, -2. / 3) * (b - FF / (3 * b)) + bulk * (J - 1) * J / b;
         if (side > 0) high = b;
         else low = b;
     }
-    const double b = low, J = stretch * b * b, FF = stretch * stretch + 2 * b * b;
+    return low;
+}
+
+double pulled_column_bar_force(const tlsph_material *material, double stretch) {
+    double p_wave, bulk, shear;
+    scene_moduli(material, &p_wave, &bulk, &shear);
+    const double b = side_stretch(bulk, shear, stretch), J = stretch * b * b, FF = stretch * stretch + 2 * b * b;
     return shear * pow(J, -2. / 3) * (stretch - FF / (3 * stretch)) + bulk * (J - 1) * J / stretch;
+}
+
+double pulled_column_stiffening(const tlsph_material *material, double stretch) {
+    double p_wave, bulk, shear;
+    scene_moduli(material, &p_wave, &bulk, &shear);
+    const double b = side_stretch(bulk, shear, stretch), J = stretch * b * b, FF = stretch * stretch + 2 * b * b;
+    return sqrt((bulk * J * J + shear * pow(J, -2. / 3) * (5 * FF / 9 - b * b / 3)) / p_wave);
 }

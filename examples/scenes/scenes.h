@@ -603,6 +603,10 @@ double pulled_column_force(const pulled_column *column);
 /* Force on a homogeneous bar of the same section (1 m^2) stretched by `stretch`, sides free, N: of psi = mu/2 (J^(-2/3) F:F
    - 3) + kappa/2 (J - 1)^2, with the stretch of the sides from P = 0 there. */
 double pulled_column_bar_force(const tlsph_material *material, double stretch);
+/* Speed of p waves across that bar in the current state by that of the undeformed body: sqrt(P_xx,xx/rho) b/c_lin, with the
+   stretch b of the sides. It is what the step of (31) with c_lin does not know: 1 at rest, 1.7 at 500 % for nu = 0.45. */
+double pulled_column_stiffening(const tlsph_material *material, double stretch);
+
 /* ---- implicit reproducing-kernel bar: 003 sections 8 and 9 ------------------------------------------------------- */
 
 /* How the weak form is integrated (003 section 9): at the nodes, with corrected test functions (VC), stabilised (NSNI), or
