@@ -28,7 +28,7 @@ SHARED := $(wildcard examples/common/*.c examples/scenes/*.c) tests/implementati
 TESTS := $(filter-out tests/implementation.c tests/fuzz.c tests/extremes.c,$(wildcard tests/*.c))
 TOPICS := $(patsubst tests/test_%.c,%,$(wildcard tests/test_*.c))
 BENCHES := $(wildcard bench/*.c)
-BENCH_PROGRAMS := build/bench build/textbook build/scaling build/study build/study_float
+BENCH_PROGRAMS := $(addprefix build/,bench textbook scaling scaling_float study study_float)
 
 all: $(EXAMPLES)
 	@echo "examples are in build/ (each tells its options with --help)"
@@ -76,6 +76,8 @@ $(EXAMPLES): build/%: build/obj/double/examples/%.o build/obj/double/shared.a
 
 build/bench build/textbook build/scaling: build/%: build/obj/double/bench/%.o build/obj/double/bench/machine.o build/obj/double/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
+build/scaling_float: build/obj/float/bench/scaling.o build/obj/float/bench/machine.o build/obj/float/shared.a
+	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 build/study: build/obj/double/bench/study.o build/obj/double/bench/runs.o build/obj/double/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 build/study_float: build/obj/float/bench/study.o build/obj/float/bench/runs.o build/obj/float/shared.a
@@ -84,8 +86,9 @@ build/study_float: build/obj/float/bench/study.o build/obj/float/bench/runs.o bu
 bench bench-full: $(BENCH_PROGRAMS)
 	build/bench $(if $(filter bench,$@),--quick)
 	build/textbook
-	build/scaling
-	sh bench/study.sh $(if $(filter bench,$@),300 "",3600 --full)
+	build/scaling $(if $(filter bench,$@),--quick)
+	build/scaling_float --memory
+	sh bench/study.sh $(if $(filter bench,$@),240,3600 --full)
 
 # Scenes and checkpoints of random bytes; tests/fuzz.c tells how libFuzzer and AFL++ run it.
 build/fuzz: tests/fuzz.c tlsph.h

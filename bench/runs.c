@@ -5,7 +5,7 @@ runs.c - scenes and choices of the study (study.h)
   wave           thermo-elastic standing wave, 2 periods: errors of displacement and temperature by the amplitudes, rms
   manufactured   finite strain and heat with exact sources: errors of p, P, theta - theta_R over five instants, rms
   column         twisting column, nu = 0.49: displacement of 4 edge points at 5 instants, against a converged run
-  block          L-shaped block, not heated: displacement of 6 corners at 4 instants, against a converged run
+  block          L-shaped block, not heated: displacement of 6 corners at 3 instants, against a converged run
 */
 #include "study.h"
 
@@ -102,7 +102,7 @@ static double length3(const double a[3]) { return sqrt(a[0] * a[0] + a[1] * a[1]
 
 /* What balances must hold to: E is conserved by the scheme itself, isothermal energy and eta as well as time is resolved. */
 static void judge(course *c, const scene_options *o, double impulse, study_run *out) {
-    const double exact = sizeof(tlsph_real) == 8 ? 1e-9 : 1e-2, rounding = sizeof(tlsph_real) == 8 ? 1e-9 : 1e-3;
+    const double exact = sizeof(tlsph_real) == 8 ? 1e-9 : 5e-2, rounding = sizeof(tlsph_real) == 8 ? 1e-9 : 1e-3;
     tlsph_ledger l;
     double scale;
     look(c);
@@ -152,7 +152,7 @@ static void run_wave(const scene_options *o, study_run *out) {
     standing_wave_default(&p);
     p.options = *o;
     p.n = out->n;
-    p.amplitude = 1e-4; /* large enough for float; the material is linear, theta moves by 1e-4 of itself */
+    p.amplitude = 5e-4; /* large for float, gentle for the sensor of fronts; theta moves by 1e-5 of itself */
     if (standing_wave_create(&p, &wave, &error) != TLSPH_OK) return;
     c.solver = wave.body.solver;
     for (int i = 1; i <= 8; i++) advance(&c, standing_wave_end(&wave) * i / 8);
@@ -190,8 +190,8 @@ typedef struct trace { int points, instants; double X[POINTS_MOST][3], t[INSTANT
 
 static const trace column_trace = { 4, 5, { { .5, 1.5, .5 }, { .5, 3, .5 }, { .5, 4.5, .5 }, { .5, 6, .5 } },
                                     { .02, .04, .06, .08, .1 }, { { { 0 } } } };
-static const trace block_trace = { 6, 4, { { 0, 0, 0 }, { 6, 0, 0 }, { 6, 3, 3 }, { 3, 3, 0 }, { 0, 10, 0 }, { 3, 10, 3 } },
-                                   { 2.5, 5, 7.5, 10 }, { { { 0 } } } };
+static const trace block_trace = { 6, 3, { { 0, 0, 0 }, { 6, 0, 0 }, { 6, 3, 3 }, { 3, 3, 0 }, { 0, 10, 0 }, { 3, 10, 3 } },
+                                   { 2.5, 5, 7.5 }, { { { 0 } } } };
 static trace references[2];
 
 static void follow(course *c, const tlsph_particles *particles, trace *t) {
@@ -299,12 +299,10 @@ int study_references_read(const char *path) {
 }
 
 int study_references_write(const char *path) {
-    FILE *file = fopen(path, "w");
+    FILE *file;
     study_run run;
     scene_options o;
     trace coarse;
-    if (!file) return 1;
-    fputs(heading, file);
     for (int i = 0; i < 2; i++) {
         memset(&run, 0, sizeof run);
         run.scene = i ? STUDY_BLOCK : STUDY_COLUMN;
@@ -316,7 +314,9 @@ int study_references_write(const char *path) {
         printf("%s: %.0f particles, %.0f s; %.2e from a run with n = %d\n", study_scenes[run.scene].name, run.particles,
                run.cpu, distance(&coarse, &references[i]), i ? FINE_BLOCK - 2 : FINE_COLUMN - 4);
         fflush(stdout);
-        each_value(&references[i], NULL, file, NULL);
     }
+    if (!(file = fopen(path, "w"))) return 1;
+    fputs(heading, file);
+    for (int i = 0; i < 2; i++) each_value(&references[i], NULL, file, NULL);
     return fclose(file);
 }

@@ -1,7 +1,7 @@
 /*
 scaling.c - memory and time by size: which arrays make up a particle, how large a body fits, what a step costs
 
-  build/scaling [--quick]
+  build/scaling [--quick]           double; build/scaling_float --memory    the memory of float
 
   The arrays are those of a solver that was really created, found by their addresses in its one block: what lies between
   one array and the next is its size. cost = a + b N + c pairs is fitted to the time of a step by least squares of the
@@ -14,6 +14,11 @@ scaling.c - memory and time by size: which arrays make up a particle, how large 
 #include "examples/common/common.h"
 #include "machine.h"
 
+#ifdef TLSPH_REAL_FLOAT
+#define PRECISION "float"
+#else
+#define PRECISION "double"
+#endif
 #define GIBIBYTE 1073741824.0
 
 /* ---- bodies ------------------------------------------------------------------------------------------------------ */
@@ -92,9 +97,8 @@ static const configuration configurations[] = {
     { "pFHJ_26", TLSPH_PFHJ, TLSPH_ISOTHERMAL, 0.9, 900 }, { "pFE_26", TLSPH_PF, TLSPH_ENERGY, 0.9, 0 },
     { "pFHJE_6", TLSPH_PFHJ, TLSPH_ENERGY, 0.6, 0 },    { "pFHJE_26", TLSPH_PFHJ, TLSPH_ENERGY, 0.9, 0 } };
 
-/* Bytes of float pair data and reals as share of double are known from the sizes: print both from one program. */
 static void weigh_all(int n, FILE *csv) {
-    printf("\nmemory of a cube of %d cells a side\n%-10s %10s %10s %8s %12s %14s %12s\n", n, "unknowns", "B/particle",
+    printf("\nmemory, " PRECISION ", cube of %d cells a side\n%-10s %10s %10s %8s %12s %14s %12s\n", n, "unknowns", "B/particle",
            "of pairs", "aim", "peak at cr.", "in 16 GiB [1e6]", "at creation");
     fprintf(csv, "configuration,bytes_per_particle,bytes_of_pairs,aim,peak_per_particle,particles_in_16GiB\n");
     for (size_t i = 0; i < sizeof configurations / sizeof *configurations; i++) {
@@ -111,7 +115,7 @@ static void weigh_all(int n, FILE *csv) {
         printf("%-10s %10.0f %10.0f %8.0f %12.0f %14.1f %12.1f\n", c->name, each, pairs, aim, m.peak / m.particles,
                16e-6 * GIBIBYTE / each, 16e-6 * GIBIBYTE * m.particles / m.peak);
         fprintf(csv, "%s,%.1f,%.1f,%.0f,%.1f,%.0f\n", c->name, each, pairs, aim, m.peak / m.particles, 16 * GIBIBYTE / each);
-        snprintf(key, sizeof key, "memory_%s_per_particle", c->name);
+        snprintf(key, sizeof key, "memory_%s_%s_per_particle", c->name, PRECISION);
         ex_result(key, each, "B");
         tlsph_cloud_destroy(&b.cloud);
     }
@@ -235,14 +239,15 @@ static void model_time(int quick, FILE *csv) {
 }
 
 int main(int argc, char **argv) {
-    int quick = 0;
+    int quick = 0, only_memory = 0;
     const char *folder = "out/bench";
     char path[512];
     FILE *csv;
     const ex_option options[] = { { "quick", EX_FLAG, &quick, NULL, NULL, 0, 0, "up to 16 thousand particles" },
-                                  { "output", EX_TEXT, &folder, NULL, NULL, 0, 0, "folder for scaling.csv" } };
-    ex_arguments(argc, argv, "scaling", "memory and time by size", options, 2);
-    snprintf(path, sizeof path, "%s/scaling.csv", folder);
+                                  { "memory", EX_FLAG, &only_memory, NULL, NULL, 0, 0, "no times" },
+                                  { "output", EX_TEXT, &folder, NULL, NULL, 0, 0, "folder for scaling_<precision>.csv" } };
+    ex_arguments(argc, argv, "scaling", "memory and time by size", options, 3);
+    snprintf(path, sizeof path, "%s/scaling_%s.csv", folder, PRECISION);
     if (ex_make_directory(folder) || !(csv = fopen(path, "w"))) { fprintf(stderr, "scaling: cannot write %s\n", path); return 1; }
     machine_print();
     weigh_all(40, csv);
@@ -250,7 +255,7 @@ int main(int argc, char **argv) {
     list_arrays(40, TLSPH_PF, TLSPH_ISOTHERMAL, "pF", csv);
     list_arrays(40, TLSPH_PFHJ, TLSPH_ISOTHERMAL, "pFHJ", csv);
     list_arrays(40, TLSPH_PFHJ, TLSPH_ENERGY, "pFHJE", csv);
-    model_time(quick, csv);
+    if (!only_memory) model_time(quick, csv);
     fclose(csv);
     return ex_exit_code();
 }

@@ -40,10 +40,12 @@ static const choice choices[] = {
     { "cfl0.4", "", "CFL 0.4 for 0.3", ON_ALL }, { "ssprk3", "", "SSP RK3 at CFL 0.5", ON_ALL },
     { "rk3", "", "rk3: dissipation once, CFL 0.5", ON_ALL }, { "rk4", "", "rk4: dissipation once, CFL 0.5", ON_ALL },
     { "double", "", "double-gradient conduction", ON_THERMAL }, { "split", "", "conduction in 9 stages of its own", ON_THERMAL } };
-enum { CHOICES = sizeof choices / sizeof *choices };
+static const choice in_float[] = { { "", "", "float", ON_ALL }, { "26", "26", "float with 26 neighbours", ON_ALL },
+                                   { "sharp rk3", "sharp rk3", "float with sharp rk3", ON_ALL } };
+enum { CHOICES = sizeof choices / sizeof *choices, IN_FLOAT = sizeof in_float / sizeof *in_float };
 
 /* Run at several resolutions for the fronts; the full study crosses operators, steps, dissipation and unknowns. */
-static const char *const candidates[] = { "", "rk3", "fast", "balanced", "accurate", "cells4 rk3", "sharp rk3", "sharp rk4" };
+static const char *const candidates[] = { "", "fast", "balanced", "accurate", "cells4 rk3", "cells4 rk4" };
 enum { CANDIDATES = sizeof candidates / sizeof *candidates };
 static const char *const operators[] = { "", "sharp", "cells4", "26", "26 cubic" };
 static const char *const integrators[] = { "", "ssprk3", "rk3", "rk4" };
@@ -99,8 +101,11 @@ static void visit_cross(FILE *file, study_scene scene, int n) {
 
 static void pass_scene(FILE *file, study_scene scene, int full) {
     const study_info *info = &study_scenes[scene];
-    for (int i = 0; i < CHOICES; i++)
-        if (applies(&choices[i], scene)) visit(file, scene, info->n[0], choices[i].configuration);
+    const int in_double = sizeof(tlsph_real) == 8, count = in_double ? CHOICES : IN_FLOAT;
+    for (int i = 0; i < count; i++) {
+        const choice *c = in_double ? &choices[i] : &in_float[i];
+        if (applies(c, scene)) visit(file, scene, info->n[0], c->configuration);
+    }
     for (int k = 0; k < (full ? 3 : 2); k++)
         for (int i = 0; i < CANDIDATES; i++) visit(file, scene, info->n[k], candidates[i]);
     for (int k = 0; full && k < 3; k++) visit_cross(file, scene, info->n[k]);
@@ -168,13 +173,17 @@ static int read_runs(const char *folder, table *t) {
     return 0;
 }
 
-/* On the front: no other run that counts is both faster and more accurate. */
+static int has_word(const study_run *r, const char *word) { return strstr(r->configuration, word) != NULL; }
+
+/* On the front: no other run that counts is faster and as accurate within 2 %. Without dissipation nothing is a choice: a
+   longer run would end. */
 static void mark_front(table *t) {
     for (int i = 0; i < t->count; i++) {
-        t->front[i] = t->run[i].ok;
+        t->front[i] = t->run[i].ok && !has_word(&t->run[i], "undamped");
         for (int k = 0; k < t->count && t->front[i]; k++) {
             const study_run *a = &t->run[i], *b = &t->run[k];
-            if (b->scene == a->scene && b->ok && b->cpu < a->cpu && b->error <= a->error) t->front[i] = 0;
+            if (b->scene == a->scene && b->ok && !has_word(b, "undamped") && b->cpu < a->cpu && b->error <= 1.02 * a->error)
+                t->front[i] = 0;
         }
     }
 }
@@ -251,8 +260,6 @@ static void price_row(table *t, FILE *csv, const choice *c, const char *precisio
 }
 
 static void print_prices(const char *folder, table *t) {
-    static const choice in_float[] = { { "", "", "float", ON_ALL }, { "rk3", "rk3", "float with rk3", ON_ALL },
-                                       { "sharp rk3", "sharp rk3", "float with sharp rk3", ON_ALL } };
     char path[512];
     FILE *csv;
     snprintf(path, sizeof path, "%s/prices.csv", folder);
@@ -266,7 +273,7 @@ static void print_prices(const char *folder, table *t) {
     printf("\n");
     fprintf(csv, "\n");
     for (int i = 0; i < CHOICES; i++) price_row(t, csv, &choices[i], "double");
-    for (int i = 0; i < 3; i++) price_row(t, csv, &in_float[i], "float");
+    for (int i = 0; i < IN_FLOAT; i++) price_row(t, csv, &in_float[i], "float");
     fclose(csv);
 }
 
@@ -275,7 +282,6 @@ static void print_prices(const char *folder, table *t) {
 enum { GROUPS = 6, LABELS_MOST = 24 };
 static const char *const groups[GROUPS] = { "6 neighbours", "26 neighbours", "sharp", "cells4", "presets", "float" };
 
-static int has_word(const study_run *r, const char *word) { return strstr(r->configuration, word) != NULL; }
 static int group_of(const study_run *r) {
     if (r->precision[0] == 'f') return 5;
     if (has_word(r, "fast") || has_word(r, "balanced") || has_word(r, "accurate")) return 4;
@@ -313,6 +319,7 @@ static int draw_front(const char *folder, table *t, study_scene scene) {
     axes.x_label = "processor time [s]";
     axes.y_label = study_scenes[scene].measure;
     axes.log_x = axes.log_y = 1;
+    if (count) { axes.x_low = 0.3 * list[0]->cpu; axes.x_high = 1.3 * list[count - 1]->cpu; } /* room for notes */
     snprintf(path, sizeof path, "%s/front_%s.png", folder, study_scenes[scene].name);
     return count ? ex_plot(path, 1000, 680, &axes, curves, used) : 0;
 }

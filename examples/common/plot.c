@@ -421,7 +421,7 @@ static void draw_notes(const chart *c) {
         for (size_t j = 0; j < curve->count; j++)
             if (place_point(c, curve, j, at) && inside(&c->frame, at))
                 ex_label(c->page, c->x0 + at[0] - 4 * c->size, c->y0 + at[1] + 5 * c->size, 0.8 * c->size,
-                         at[0] - c->frame.left > ex_label_width(c->size, curve->name) ? EX_RIGHT : EX_LEFT, 0, curve->name);
+                         at[0] - c->frame.left > ex_label_width(0.8 * c->size, curve->name) + 4 * c->size ? EX_RIGHT : EX_LEFT, 0, curve->name);
     }
 }
 
