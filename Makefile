@@ -110,10 +110,10 @@ SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
 SLOW_STEPS := "build/test_double --slow" "build/test_fast_math errors/" \
   $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
     "$(call SKIPPED,no sanitizers)") \
-  "build/fuzz 20000" \
+  "build/fuzz 20000" "build/extremes_double --quick" \
   $(if $(VALGRIND),"valgrind -q --error-exitcode=9 --leak-check=full build/test_valgrind checkpoint/continues memory/ errors/ operators/cells fill/refusals",\
     "$(call SKIPPED,no valgrind)")
-SLOW_PROGRAMS := build/fuzz build/test_double build/test_fast_math $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
+SLOW_PROGRAMS := build/fuzz build/extremes_double build/test_double build/test_fast_math $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
 
 test: build/test_double build/test_float
 	@sh tests/run.sh $(FAST_STEPS)

@@ -202,7 +202,7 @@ static int twist_holds(tlsph_unknowns unknowns, double nu, double omega) {
     twisting_column column;
     tlsph_ledger first, last;
     twisting_column_default(&p);
-    p.n = 3;
+    p.n = 2;
     p.nu = nu;
     p.omega = omega;
     p.options.unknowns = (int)unknowns;
@@ -215,7 +215,7 @@ static int twist_holds(tlsph_unknowns unknowns, double nu, double omega) {
     return !result && last.total_energy <= first.total_energy * (1 + 100 * EPSILON);
 }
 static void twist_row(const char *name, tlsph_unknowns unknowns, double nu, double least) {
-    static const double omegas[] = { 105, 200, 400, 600, 800, 1200, 1600, 2400, 3200 };
+    static const double omegas[] = { 105, 200, 400, 800, 1600, 3200, 6400 };
     double most = 0;
     for (size_t i = 0; i < sizeof omegas / sizeof *omegas && twist_holds(unknowns, nu, omegas[i]); i++) most = omegas[i];
     at_least(name, most, least, "rad/s", "initial spin of the top, up to which it survives");
@@ -315,9 +315,9 @@ static void turning(const void *scene, const tlsph_real X[3], scene_state *state
     state->v[0] = -omega * ((double)X[1] - 1);
     state->v[1] = omega * ((double)X[0] - 1);
 }
-/* Revolutions of a free body whose rim moves at a third of the shear speed. */
+/* Revolutions of a free body whose rim moves at two thirds of the shear speed. */
 static void spin_row(const char *name, int dimension, int n, tlsph_shape shape, tlsph_integrator integrator) {
-    const double omega = 0.2, turns = 1000;
+    const double omega = 0.4, turns = 1000;
     rig r;
     rig_begin(&r, n, n, dimension == 3 ? n : 0, 2.0 / n);
     r.fill.shape = shape;
@@ -340,7 +340,7 @@ static void spin_row(const char *name, int dimension, int n, tlsph_shape shape, 
 }
 static void spin(void) {
     spin_row("spinning disk", 2, 8, TLSPH_CYLINDER, TLSPH_RK3_FROZEN);
-    spin_row("spinning cube", 3, 4, TLSPH_BOX, TLSPH_RK3_FROZEN);
+    spin_row("spinning cube", 3, 3, TLSPH_BOX, TLSPH_RK3_FROZEN);
 }
 
 static void lively_plane(const void *scene, const tlsph_real X[3], scene_state *state) {
@@ -390,7 +390,7 @@ static void noise(const void *scene, const tlsph_real X[3], scene_state *state) 
 }
 static int noise_grows(tlsph_integrator integrator, double nu, double cfl) {
     rig r;
-    rig_begin(&r, 4, 4, 4, 0.25);
+    rig_begin(&r, 8, 8, 8, 0.125);
     r.materials[0].kind = TLSPH_LINEAR;
     r.materials[0].poisson = R(nu);
     r.desc.integrator = integrator;
@@ -398,29 +398,31 @@ static int noise_grows(tlsph_integrator integrator, double nu, double cfl) {
     rig_create(&r);
     rig_state(&r, NULL, noise);
     const double first = rig_ledger(&r).total_energy;
-    const int grows = rig_steps(&r, 400) || !(rig_ledger(&r).total_energy < first);
+    const int grows = rig_steps(&r, 200) || !(rig_ledger(&r).total_energy < first);
     rig_end(&r);
     return grows;
 }
 /* The shortest waves of a lattice feel the raw jumps: their velocity decays at 2 (c_p + 2 c_s)/h (three axes, of which one
-   is along the motion), and no central difference acts on them. So the CFL number is limited by where the scheme's
-   region of stability ends on the real axis: 2 for RK2 and frozen dissipation, 2.5127 for three full stages. */
-static void cfl(void) {
-    static const char *const names[] = { "RK2", "SSP RK3", "RK3, frozen dissipation", "RK4, frozen dissipation" };
-    static const double reach[] = { 2, 2.5127, 2, 2 };
-    for (int i = 0; i < 4; i++) {
-        const double nu = 0.3, ratio = sqrt((1 - 2 * nu) / (2 - 2 * nu)), theory = reach[i] / (2 + 4 * ratio);
-        double stable = 0.1, unstable = 1;
-        if (noise_grows((tlsph_integrator)i, nu, stable)) unstable = stable;
-        while (unstable - stable > 0.01) {
-            const double middle = (stable + unstable) / 2;
-            if (noise_grows((tlsph_integrator)i, nu, middle)) unstable = middle;
-            else stable = middle;
-        }
-        const double promised = (double)tlsph_cfl_limit((tlsph_integrator)i);
-        at_least(text("CFL number, %s", names[i]), stable, promised, "",
-                 text("theory %.3f for the shortest waves", theory));
+   is along the motion), and no central difference acts on them. So in a large body the CFL number is limited by where the
+   scheme's region of stability ends on the real axis: 2 for RK2 and frozen dissipation, 2.5127 for three full stages. */
+static void cfl_row(const char *name, tlsph_integrator integrator, double nu, double reach) {
+    const double ratio = sqrt((1 - 2 * nu) / (2 - 2 * nu)), theory = reach / (2 + 4 * ratio);
+    const double promised = fmin((double)tlsph_cfl_limit(integrator), theory);
+    double stable = 0.1, unstable = 1;
+    if (noise_grows(integrator, nu, stable)) unstable = stable;
+    while (unstable - stable > 0.02) {
+        const double middle = (stable + unstable) / 2;
+        if (noise_grows(integrator, nu, middle)) unstable = middle;
+        else stable = middle;
     }
+    at_least(text("CFL number, %s, nu %g", name, nu), stable, promised, "", text("theory for the shortest waves: %.3f", theory));
+}
+static void cfl(void) {
+    static const char *const names[] = { "RK2", "SSP RK3", "RK3 frozen", "RK4 frozen" };
+    static const double reach[] = { 2, 2.5127, 2, 2 };
+    for (int i = 0; i < 4; i++) cfl_row(names[i], (tlsph_integrator)i, 0.3, reach[i]);
+    cfl_row(names[0], TLSPH_RK2, -0.5, reach[0]);
+    cfl_row(names[2], TLSPH_RK3_FROZEN, 0, reach[2]);
 }
 
 /* ---- units ------------------------------------------------------------------------------------------------------- */
@@ -609,10 +611,10 @@ static void heat_jump(const char *name, double ratio, tlsph_thermal thermal, int
     rig_end(&r);
 }
 /* Free thermoelastic motion that starts with a jump of 1 : 1000 about theta_R = 300 K. */
-static void hot_and_cold(const char *name, tlsph_material_kind kind, tlsph_thermal thermal) {
+static void hot_and_cold(const char *name, tlsph_material_kind kind, tlsph_thermal thermal, double expansion) {
     const double theta[2] = { 1, 1000 };
     rig r;
-    thermal_rig(&r, kind, thermal, 3e-4, 1e-3);
+    thermal_rig(&r, kind, thermal, expansion, 1e-3);
     rig_create(&r);
     rig_state(&r, theta, two_temperatures);
     const tlsph_ledger first = rig_ledger(&r);
@@ -629,7 +631,10 @@ static void cold_state(const void *scene, const tlsph_real X[3], scene_state *st
     lively(&speed, X, state);
     state->theta = *(const double *)scene;
 }
-/* The least share of theta_R at which a vibrating body keeps its temperature: without friction it would stay as it is. */
+/* The least share of theta_R at which a body that vibrates with 2e-3 J/m^3 keeps its temperature. The energy form's heat is
+   what is left of E, so it holds the scheme's error of the mechanical energy, some percent of that: below, theta turns
+   negative. The entropy form divides the heat of dissipation by theta: below, one step heats by more than theta, and the
+   exponential runs away. */
 static double coldest(tlsph_thermal thermal, const char **note) {
     double good = 1;
     for (double share = 1e-1; share > 1e-13; share /= 10) {
@@ -674,13 +679,14 @@ static void heat(void) {
     const char *note;
     heat_jump("heat between 1 : 1000, energy form", 1000, TLSPH_ENERGY, 0);
     heat_jump("heat between 1 : 1000, own stages", 1000, TLSPH_ENERGY, 50);
-    hot_and_cold("free body of 1 and 1000 K, energy", TLSPH_MIE_GRUNEISEN, TLSPH_ENERGY);
-    hot_and_cold("free body of 1 and 1000 K, entropy", TLSPH_MIE_GRUNEISEN, TLSPH_ENTROPY);
-    hot_and_cold("free body of 1 and 1000 K, MEE", TLSPH_MEE, TLSPH_ENERGY);
+    hot_and_cold("free body of 1 and 1000 K, energy", TLSPH_MIE_GRUNEISEN, TLSPH_ENERGY, 3e-4);
+    hot_and_cold("free body of 1 and 1000 K, entropy", TLSPH_MIE_GRUNEISEN, TLSPH_ENTROPY, 3e-4);
+    /* its stiffness is proportional to theta: a cold half has a 300th of it and could not bear what the hot one expands by */
+    hot_and_cold("free body of 1 and 1000 K, MEE", TLSPH_MEE, TLSPH_ENERGY, 1e-5);
     double least = coldest(TLSPH_ENERGY, &note);
-    at_most("coldest vibrating body by theta_R, energy form", least, IS_FLOAT ? 1e-4 : 1e-11, "", note);
+    at_most("coldest vibrating body by theta_R, energy form", least, 1e-5, "", note);
     least = coldest(TLSPH_ENTROPY, &note);
-    at_most("coldest vibrating body by theta_R, entropy form", least, IS_FLOAT ? 1e-10 : 1e-12, "", note);
+    at_most("coldest vibrating body by theta_R, entropy form", least, 1e-7, "", note);
     conduction_row("conduction 0, alternating temperatures", 0, 0, IS_FLOAT ? 1e-5 : 1e-13);
     conduction_row("conduction 1e3, alternating temperatures", 1e3, 0, 1);
     conduction_row("conduction 10 in 200 stages of its own", 10, 200, 1e-3);
@@ -905,7 +911,7 @@ static double alternating_part(const rig *r, tlsph_field field, int component) {
     free(values);
     return sum / volume;
 }
-/* The part of a checkerboard that is left after the time in which sound crosses the body once. */
+/* The part of a checkerboard that is left after the time in which sound crosses the body four times. */
 static void mode_row(const char *name, tlsph_unknowns unknowns, scene_state_fn state, tlsph_field field, double most,
                      const char *why) {
     const double amplitude = 1e-3;
@@ -916,8 +922,7 @@ static void mode_row(const char *name, tlsph_unknowns unknowns, scene_state_fn s
     rig_create(&r);
     rig_state(&r, &amplitude, state);
     const double first = alternating_part(&r, field, 0), energy = rig_ledger(&r).total_energy;
-    const double dt = r.body.solver ? (double)tlsph_stable_time_step(r.body.solver) : 1;
-    rig_steps(&r, (long)(4 * 0.25 / 0.3 / 0.25) * 4 + (long)(0 * dt));
+    rig_steps(&r, 52);
     const double left = fabs(alternating_part(&r, field, 0) / first), energy_left = rig_ledger(&r).total_energy / energy;
     at_most(text("%s: share left", name), r.result ? HUGE_VAL : left, most, "",
             text("%lu steps, %.2g of the energy; %s", (unsigned long)rig_ledger(&r).step, energy_left, why));
@@ -925,7 +930,8 @@ static void mode_row(const char *name, tlsph_unknowns unknowns, scene_state_fn s
 }
 static void modes(void) {
     mode_row("alternating velocity, {p,F}", TLSPH_PF, checkered_velocity, TLSPH_FIELD_VELOCITY, 1e-3, "");
-    mode_row("alternating velocity, {p,F,J}", TLSPH_PFJ, checkered_velocity, TLSPH_FIELD_VELOCITY, 1e-3, "");
+    mode_row("alternating velocity, {p,F,J}", TLSPH_PFJ, checkered_velocity, TLSPH_FIELD_VELOCITY, 1e-2,
+             "c_s is a tenth of c_p at this nu");
     mode_row("alternating J, {p,F,J}", TLSPH_PFJ, checkered_jacobian, TLSPH_FIELD_PRESSURE, 0.1, "");
     mode_row("alternating det F, {p,F}", TLSPH_PF, checkered_jacobian, TLSPH_FIELD_PRESSURE, 1.0,
              "no jump of v sees it inside: {p,F} keeps it");
@@ -958,12 +964,39 @@ static double impact_error(double share, const char **note) {
     return result ? HUGE_VAL : fabs(mean.stress / exact.stress - 1);
 }
 static void shocks(void) {
-    static const double shares[] = { 0.1, 0.5, 1, 2, 4 };
+    static const double shares[] = { 0.1, 0.5, 1, 2 };
     const char *note;
     for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
         const double error = impact_error(shares[i], &note);
         at_most(text("halves of a bar meet at %g c_p each: stress, error", shares[i]), error, 0.05, "", note);
     }
+}
+static void meeting(const void *scene, const tlsph_real X[3], scene_state *state) {
+    const double side = (double)X[0] - 1;
+    state->v[0] = fabs(side) < 1e-6 ? 0 : side < 0 ? *(const double *)scene : -*(const double *)scene;
+}
+/* Faster halves cross a spacing within a step: retries carry on, the limit of what a step may squeeze keeps the energy. */
+static void meeting_row(double share) {
+    rig r;
+    rig_begin(&r, 20, 3, 3, 0.1);
+    r.desc.retries = 20;
+    r.desc.limit = R(0.3);
+    rig_create(&r);
+    const double speed = share * impact_p_speed(&r.materials[0]);
+    rig_state(&r, &speed, meeting);
+    const tlsph_ledger first = rig_ledger(&r);
+    if (!r.result) r.result = tlsph_advance(r.body.solver, R(1 / share));
+    const tlsph_ledger l = rig_ledger(&r);
+    at_most(text("halves meet at %g c_p each, retries and limit: energy missed", share),
+            r.result ? HUGE_VAL : fabs(l.energy_residual) / first.kinetic_energy, 0.03, "",
+            text("%lu steps, %lu retries, least J %.2g; %s", (unsigned long)l.step, (unsigned long)l.retries, l.jacobian_least,
+                 rig_message(&r)));
+    rig_end(&r);
+}
+static void fast_shocks(void) {
+    meeting_row(4);
+    meeting_row(8);
+    meeting_row(16);
 }
 /* A face that is hot or cold at once, and for ever. */
 static void thermal_shock(const char *name, double theta, double expansion) {
@@ -992,7 +1025,8 @@ static const group groups[] = {
     { "spin", spin, 0 },         { "thousands", thousands, 1 },
     { "million", million, 0 },   { "cfl", cfl, 1 },       { "scaling", scaling, 1 },   { "places", places, 1 },
     { "heat", heat, 1 },         { "jumps", jumps, 1 },     { "stiff_jumps", stiff_jumps, 0 },   { "clouds", clouds, 1 },     { "supports", supports, 0 },
-    { "modes", modes, 1 },       { "shocks", shocks, 1 }, { "thermal_shocks", thermal_shocks, 1 },
+    { "modes", modes, 1 },       { "shocks", shocks, 1 }, { "fast_shocks", fast_shocks, 1 },
+    { "thermal_shocks", thermal_shocks, 1 },
 };
 
 static int chosen(const group *g, int argc, char **argv) {
