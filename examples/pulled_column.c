@@ -159,18 +159,20 @@ static pulled_column_parameters row_parameters(const pulled_column_parameters *g
 /* What became of a run: it reached the end, failed, or used up its processor time. */
 typedef enum outcome { REACHED, FAILED, OUT_OF_TIME } outcome;
 
-static outcome elongation_of(const pulled_column_parameters *p, double seconds, double *elongation) {
+/* *force: by that of a homogeneous bar, where the run stopped: what it was worth. */
+static outcome elongation_of(const pulled_column_parameters *p, double seconds, double *elongation, double *force) {
     static pulled_column column;
     const double end = pulled_column_end(p), began = ex_cpu_seconds();
     outcome what = REACHED;
     tlsph_error error;
-    *elongation = 0;
+    *elongation = *force = 0;
     if (pulled_column_create(p, &column, &error) != TLSPH_OK) { driver_error(&error); return FAILED; }
     while (what == REACHED && end - (double)tlsph_time(column.body.solver) > 1e-10 * end) {
         if (tlsph_step(column.body.solver, (tlsph_real)(end - (double)tlsph_time(column.body.solver))) != TLSPH_OK) what = FAILED;
         else if (seconds > 0 && ex_cpu_seconds() - began > seconds) what = OUT_OF_TIME;
     }
     *elongation = pulled_column_elongation(&column);
+    *force = pulled_column_force(&column) / pulled_column_bar_force(&column.body.material, 1 + *elongation / 100);
     scene_destroy(&column.body);
     return what;
 }
@@ -238,9 +240,12 @@ static int run_study(const pulled_column_parameters *given, const study_options 
             if (study->ratio && study->ratio != r + 1) continue;
             const pulled_column_parameters p = row_parameters(given, &row, ratios[r]);
             const double began = ex_cpu_seconds();
-            const outcome what = elongation_of(&p, study->seconds, &reached[r][count]);
+            double force;
+            const outcome what = elongation_of(&p, study->seconds, &reached[r][count], &force);
             snprintf(key, sizeof key, "elongation_%s_%g%s", row.key, ratios[r], suffix[what]);
             ex_result(key, reached[r][count], "percent");
+            snprintf(key, sizeof key, "force_by_bar_%s_%g", row.key, ratios[r]);
+            ex_result(key, force, "1");
             if (!given->options.quiet) fprintf(stderr, "%s: %.0f s\n", key, ex_cpu_seconds() - began);
             if (row.sets & STEP_SET && what == FAILED) report_courant(&row, &p, ratios[r], reached[r][count]);
             if (i == 0) ex_check_true(r ? "own_does_not_fail_0.495" : "own_does_not_fail_0.45", what != FAILED);
