@@ -9344,7 +9344,7 @@ static int tlsphi_factor_moments(tlsphi_moments *m) {
             double sum = m->M[i][j];
             for (int k = 0; k < j; k++) sum -= m->M[i][k] * m->M[j][k];
             if (j < i) m->M[i][j] = sum / m->M[j][j];
-            else if (!(sum > 1e-12 * largest)) return 0;
+            else if (!(sum > 3e-8 * largest)) return 0; /* rounding, 1e-16 over the last pivot, must stay below */
             else m->M[i][i] = sqrt(sum);
         }
     }
