@@ -20,6 +20,7 @@ takes = $(shell printf '%s\nint main(void) { return 0; }\n' '$(2)' | $(CC) $(1) 
 comma := ,
 OPENMP := $(if $(call takes,-fopenmp,int omp_get_max_threads(void); int (*probe)(void) = omp_get_max_threads;),-fopenmp)
 SANITIZE := $(if $(call takes,-fsanitize=address$(comma)undefined),-fsanitize=address$(comma)undefined -fno-sanitize-recover=all)
+THREAD_SANITIZE := $(if $(call takes,-fsanitize=thread),-fsanitize=thread)
 VALGRIND := $(shell command -v valgrind 2> /dev/null)
 
 EXAMPLES := $(patsubst examples/%.c,build/%,$(wildcard examples/*.c))
@@ -66,7 +67,9 @@ $(eval $(call flavour,sanitized,-O1 -g $(SANITIZE) $(ASSERT),-O1 -g $(SANITIZE))
 $(eval $(call flavour,sanitized_float,-O1 -g $(SANITIZE) $(ASSERT) $(FLOAT),-O1 -g $(SANITIZE) $(FLOAT)))
 $(eval $(call flavour,valgrind,-O1 -g,-O1 -g))
 # The header promises to find values that are not finite even so.
-$(eval $(call flavour,fast_math,-O3 -ffast-math,-O1))
+$(eval $(call flavour,fast_math,-Ofast $(OPENMP),-O1))
+# Threads of the host only: the sanitizer does not know those of OpenMP's library.
+$(eval $(call flavour,threads,-O1 -g $(THREAD_SANITIZE),-O1 -g $(THREAD_SANITIZE)))
 # A function that is inlined everywhere counts once, as it stands in the source.
 $(eval $(call flavour,coverage,-O0 -g --coverage -Dalways_inline=unused,-O0))
 
@@ -95,6 +98,11 @@ bench bench-full: $(BENCH_PROGRAMS)
 build/fuzz: tests/fuzz.c tlsph.h
 	@mkdir -p $(@D)
 	$(CC) -std=c99 $(WARNINGS) -O1 -g $(SANITIZE) -I. $< -o $@ $(LDLIBS)
+CLANG ?= clang
+build/fuzz_libfuzzer: tests/fuzz.c tlsph.h
+	$(CLANG) -std=c99 -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all -DFUZZ_ENTRY -I. $< -o $@ $(LDLIBS)
+build/fuzz_afl: tests/fuzz.c tlsph.h
+	AFL_USE_ASAN=1 AFL_USE_UBSAN=1 afl-clang-fast -std=c99 -O1 -g -I. $< -o $@ $(LDLIBS)
 
 # The list of test files; rewritten only when it changes.
 build/suites.h: FORCE
@@ -107,14 +115,18 @@ build/suites.h: FORCE
 QUICK := $(filter-out physics%,$(TOPICS))
 SKIPPED = echo "$(1)"; echo "0 passed, 0 failed, 1 skipped"
 FAST_STEPS := "build/test_double" "build/test_float" "CC='$(CC)' sh tests/header.sh"
+FAST_MATH := errors/ limits/ cells4/ physics_balances/ physics_invariance/ physics_integrators/ physics_loads/ \
+  physics_incompressible/
 SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
-SLOW_STEPS := "build/test_double --slow" "build/test_fast_math errors/" \
+SLOW_STEPS := "build/test_double --slow" "build/test_fast_math $(FAST_MATH)" \
+  $(if $(THREAD_SANITIZE),"build/test_threads embedding/","$(call SKIPPED,no thread sanitizer)") \
   $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
     "$(call SKIPPED,no sanitizers)") \
-  "build/fuzz 20000" "build/extremes_double --quick" \
-  $(if $(VALGRIND),"valgrind -q --error-exitcode=9 --leak-check=full build/test_valgrind checkpoint/continues memory/ errors/ operators/cells fill/refusals",\
+  "build/fuzz 50000" "build/extremes_double --quick" \
+  $(if $(VALGRIND),"valgrind -q --error-exitcode=9 --leak-check=full build/test_valgrind checkpoint/continues memory/ errors/ limits/counts limits/surfaces limits/forged operators/cells fill/refusals",\
     "$(call SKIPPED,no valgrind)")
-SLOW_PROGRAMS := build/fuzz build/extremes_double build/test_double build/test_fast_math $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
+SLOW_PROGRAMS := build/fuzz build/extremes_double build/test_double build/test_fast_math $(if $(THREAD_SANITIZE),build/test_threads) \
+  $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
 
 test: build/test_double build/test_float
 	@sh tests/run.sh $(FAST_STEPS)

@@ -6200,7 +6200,8 @@ TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_
     for (int k = 0; k < arrays; k++)
         for (size_t h = 0; h < s->n; h++)
             for (size_t i = 0; i < components[k]; i++) array[k][components[k] * s->inner[h] + i] = tlsphi_get_real(&at);
-    if (!tlsphi_finite((tlsph_real)time) || tlsphi_evaluate(s)) { /* a checksum can be forged */
+    const int finite = tlsphi_finite((tlsph_real)time) && tlsphi_all_finite(s->now_memory, s->state_reals);
+    if (!finite || tlsphi_evaluate(s)) { /* a checksum can be forged */
         tlsphi_restore_state(s);
         return tlsphi_fail(&s->error, TLSPH_ERROR_CHECKPOINT, "restore", "state", TLSPH_NO_PARTICLE, time, 0,
                            "one that steps have led to");
