@@ -406,7 +406,7 @@ typedef struct tlsph_desc {
                                             stages of its own in each half step (see SUPER-STEPS) */
     int sharp_gradients;                 /* 1: fourth-order dispersion on lattices, twice the cost; default 0. Needs an
                                             antisymmetric operator: cells, given, or a box lattice with support 0.6 */
-    int tight_closure;                   /* 1: TLSPH_CLOSED exact for linear fields to 3e-4, not 2e-2; default 0 */
+    int tight_closure;                   /* 1: TLSPH_CLOSED exact for linear fields to 1e-3, not 2e-2, at ten times the cost; default 0 */
     int mirror_gradients;                /* 1: gradients know rollers and tangent planes; default 1 */
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
     int projection;                      /* 1: angular-momentum projection (000-79 to 82); default 1 */
@@ -443,7 +443,7 @@ typedef struct tlsph_size {
 /* What TLSPH_CLOSED took to make and how well it holds (see tlsph_closure_read). */
 typedef struct tlsph_closure {
     int iterations;                       /* of the conjugate gradients */
-    double residual;                      /* largest residual of the equations, in the local spacing's area */
+    double residual;                      /* largest of the first equations, in the local spacing's area and 2 V */
     double closing, linear;               /* largest |sum C + B| / spacing's area; |sum C (x) d / 2 - V I| / V */
     double change_mean, change_largest;   /* |C - start| / mean |start|, the start being symmetrised corrected kernels */
 } tlsph_closure;
@@ -2239,177 +2239,175 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
      C_ab = -C_ba,   sum_b C_ab = -B_a,   1/2 sum_b C_ab (x) d = V_a I
 
    so that a uniform stress is in balance with the tractions P B_a and linear fields have exact gradients. Of all such C
-   take the one nearest to zero in the norm sum |C|^2/w, w the kernel's -2 w_a w_b W'/r. Lagrange's multipliers l_a, m_a
-   (1 + D for each component of C, the same matrix for all) give
+   take the one nearest to zero in the norm sum |C|^2/w, w the kernel's -2 w_a w_b W'/r. Lagrange's multipliers l_a (a
+   vector) and m_a (a matrix) give
 
-     C_ab = w [(l_a - l_b) + (m_a + m_b).d]
+     C_ab = w [(l_a - l_b) + (m_a + m_b) d]
 
    and m_a = V_a (sum w d (x) d)^-1, l = 0 is a symmetrised corrected kernel, from which the solution starts. The matrix is
    singular for quadratic l with m = grad l / 2, and nearly so for smooth ones; so both conditions get a little slack,
-   which changes B_a only where it is not zero and only along its own axes:
+   which changes B_a only where it is not zero and only in its length (at corners with D + 1 neighbours or fewer, whose
+   conditions outnumber their pairs, in all directions):
 
-     B_a -> B_a + s0 s_a l_a,  s_a,i = 0.01 n_i^2;    V_a I -> V_a I - s0 eps h^2 (m_a - start),  eps = 1e-3 (V_a/h^D)^2
+     B_a -> B_a + s0 n (n.l_a)/100,  n = B_a/|B_a|;    V_a I -> V_a I - s0 eps h^2 (m_a - start),  eps = 1e-3 (V_a/h^D)^2
 
    s0 = sum_b w. The volumes' slack leaves gradients of linear fields wrong by up to 2 % in a few particles, 0.2 % on average.
-   Where that is too much (`tight_closure`, or more than 5 % anywhere), a second, better conditioned solution starts
-   from the first, with the new B_a: it takes the slack of the volumes away and holds l instead, s0 (l_a - first
-   l_a)/10000. It costs as much again, and waves are not the better for it. What the iterations leave of sum C + B
-   is at last taken away by l alone, a graph's Laplacian, so that inside the body a uniform stress exerts no force
-   but round-off.
-   Conjugate gradients, one for each component, all in one sweep over the pairs; preconditioner: the inverse of each
-   particle's own (1 + D) x (1 + D) block. In units of the largest spacing. */
+   Where there are more than 5 % anywhere, a second solution goes on from the first with a tenth of that slack; with
+   `tight_closure` with a hundredth, which leaves 0.1 % and costs ten times as much, and waves are not the better for it.
+   What the iterations leave of sum C + B is at last taken away by l alone, a graph's Laplacian, so that inside the body
+   a uniform stress exerts no force but round-off.
+   Conjugate gradients; preconditioner: the inverse of each particle's own (1 + D) x (1 + D) block, one for all components.
+   In units of the largest spacing. w and d are rounded to float: that halves the memory to read and costs d 1e-7. */
 
 #define TLSPHI_CLOSURE_SLACK 1e-3  /* eps */
-#define TLSPHI_CLOSURE_AREA 0.01   /* s_a along n */
-#define TLSPHI_CLOSURE_LIMIT 1e-3  /* largest residual of the first solution, in the local spacing's area and volume */
+#define TLSPHI_CLOSURE_AREA 0.01   /* slack of B_a along n */
+#define TLSPHI_CLOSURE_LIMIT 1e-2  /* largest residual of the first solution, in the local spacing's area and 2 V */
 #define TLSPHI_CLOSURE_DEFECT 0.05 /* of linear fields in any particle, above which the second solution is made */
-#define TLSPHI_CLOSURE_HOLD 1e-4   /* second solution: slack of l, */
-#define TLSPHI_CLOSURE_REST 1e-6   /* what is left of the volumes' slack, */
-#define TLSPHI_CLOSURE_TIGHT 1e-4  /* largest residual */
+#define TLSPHI_CLOSURE_TIGHT 1e-3  /* the same with `tight_closure` */
 #define TLSPHI_CLOSURE_BALANCE 1e-9 /* largest residual of sum C + B in the end */
 #define TLSPHI_CLOSURE_STEPS 20000 /* iterations, far more than ever needed */
 #define TLSPHI_CLOSURE_BLOCK 256   /* particles a task */
 
+/* Unknowns of a particle: `rows` rows of 4, components across and the fourth of them empty; the first row is l, then the
+   columns of m. While l alone moves there is one row. */
 typedef struct tlsphi_closer {
     tlsphi_plan *plan;
-    size_t n, tasks, rows, width; /* rows = 1 + D, width = rows * D unknowns of a particle, component by component */
+    size_t n, tasks, rows;
     size_t *first;                /* neighbours in grid order */
     uint32_t *list;
-    double *pair;                     /* w, d: rows each */
-    double *x, *r, *p, *q;            /* unknowns, residual, direction, K times direction; width each */
-    double *block, *slack, *area;     /* inverse blocks; slack of l (D) and of m (1); local spacing's area h^(D-1) */
-    double *sums;                     /* 3 a task */
-    double step[3], beta[3];
-    double unit;                      /* m */
-    int second, balances;             /* second solution; l alone */
+    float (*pair)[4];             /* w, d */
+    double *x, *r, *p, *q;        /* unknowns, residual, direction, K times direction */
+    float (*block)[16];           /* inverse blocks */
+    double (*slack)[7];           /* n times the root of B's slack; slack of m; scales of residuals: h^(D-1), 2 V; across n */
+    double *sums;                 /* 2 a task */
+    double step, beta, eased, unit; /* eased: share of the slack; unit: m */
 } tlsphi_closer;
 
-TLSPHI_INLINE void tlsphi_closure_product(tlsphi_closer *c, size_t i, const int dim) {
-    const size_t rows = (size_t)dim + 1, width = rows * (size_t)dim, begin = i * TLSPHI_CLOSURE_BLOCK;
-    const size_t end = begin + TLSPHI_CLOSURE_BLOCK < c->n ? begin + TLSPHI_CLOSURE_BLOCK : c->n;
-    double sums[3] = {0, 0, 0};
-    for (size_t a = begin; a < end; a++) {
-        const double *pa = c->p + width * a, *slack = c->slack + rows * a;
-        double y[12] = {0};
-        for (size_t k = c->first[a]; k < c->first[a + 1]; k++) {
-            const double *pb = c->p + width * c->list[k], *pair = c->pair + rows * k, w = pair[0];
-            TLSPHI_UNROLL for (int j = 0; j < dim; j++) {
-                const int at = j * (dim + 1);
-                double X = pa[at] - pb[at];
-                TLSPHI_UNROLL for (int l = 1; l <= dim; l++) X += (pa[at + l] + pb[at + l]) * pair[l];
-                X *= w;
-                y[at] += X;
-                TLSPHI_UNROLL for (int l = 1; l <= dim; l++) y[at + l] += X * pair[l];
-            }
-        }
-        for (int j = 0; j < dim; j++) {
-            const int at = j * (dim + 1);
-            y[at] += slack[j] * pa[at];
-            for (int l = 1; l <= dim; l++) y[at + l] += slack[dim] * pa[at + l];
-            for (int l = 0; l <= dim; l++) sums[j] += y[at + l] * pa[at + l];
-        }
-        memcpy(c->q + width * a, y, width * sizeof *y);
+/* The loop over components; left rolled it becomes one vector operation. */
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 8
+#define TLSPHI_LANES _Pragma("GCC unroll 1") for (int j = 0; j < 4; j++)
+#else
+#define TLSPHI_LANES for (int j = 0; j < 4; j++)
+#endif
+
+/* q = K p for one particle; the sum of q.p. */
+TLSPHI_INLINE double tlsphi_closure_row(const tlsphi_closer *c, size_t a, const int rows) {
+    const double *slack = c->slack[a], *from = c->p + 4 * (size_t)rows * a;
+    double pa[16], y[16] = {0}, *q = c->q + 4 * (size_t)rows * a, sum = 0;
+    TLSPHI_UNROLL for (int l = 0; l < rows; l++) TLSPHI_LANES pa[4 * l + j] = from[4 * l + j];
+    for (size_t k = c->first[a]; k < c->first[a + 1]; k++) {
+        const double *pb = c->p + 4 * (size_t)rows * c->list[k], w = (double)c->pair[k][0];
+        const double d[4] = {0, (double)c->pair[k][1], (double)c->pair[k][2], (double)c->pair[k][3]};
+        double X[4];
+        TLSPHI_LANES X[j] = pa[j] - pb[j];
+        TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_LANES X[j] += (pa[4 * l + j] + pb[4 * l + j]) * d[l];
+        TLSPHI_LANES X[j] *= w;
+        TLSPHI_LANES y[j] += X[j];
+        TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_LANES y[4 * l + j] += X[j] * d[l];
     }
-    for (int j = 0; j < 3; j++) c->sums[4 * i + (size_t)j] = sums[j];
-}
-/* The rows and columns of l alone. */
-static void tlsphi_closure_laplacian(tlsphi_closer *c, size_t i) {
-    const size_t rows = c->rows, begin = i * TLSPHI_CLOSURE_BLOCK, D = rows - 1;
-    double *sums = c->sums + 4 * i;
-    sums[0] = sums[1] = sums[2] = 0;
-    for (size_t a = begin; a < begin + TLSPHI_CLOSURE_BLOCK && a < c->n; a++) {
-        const double *pa = c->p + c->width * a;
-        double y[3] = {0, 0, 0};
-        for (size_t k = c->first[a]; k < c->first[a + 1]; k++)
-            for (size_t j = 0; j < D; j++) y[j] += c->pair[rows * k] * (pa[rows * j] - c->p[c->width * c->list[k] + rows * j]);
-        for (size_t j = 0; j < D; j++) {
-            c->q[c->width * a + rows * j] = y[j] += c->slack[rows * a + j] * pa[rows * j];
-            sums[j] += y[j] * pa[rows * j];
-        }
-    }
+    const double along = tlsphi_dot3(slack, pa);
+    for (int j = 0; j < 3; j++) y[j] += slack[j] * along + slack[6] * pa[j];
+    for (int k = 4; k < 4 * rows; k++) y[k] += slack[3] * pa[k];
+    for (int k = 0; k < 4 * rows; k++) sum += (q[k] = y[k]) * pa[k];
+    return sum;
 }
 static void tlsphi_closure_product_task(void *arg, size_t i) {
     tlsphi_closer *c = (tlsphi_closer *)arg;
-    if (c->balances) tlsphi_closure_laplacian(c, i);
-    else if (c->plan->dim == 3) tlsphi_closure_product(c, i, 3);
-    else tlsphi_closure_product(c, i, 2);
+    const size_t begin = i * TLSPHI_CLOSURE_BLOCK;
+    double sum = 0;
+    for (size_t a = begin; a < begin + TLSPHI_CLOSURE_BLOCK && a < c->n; a++)
+        sum += c->rows == 4 ? tlsphi_closure_row(c, a, 4) : c->rows == 3 ? tlsphi_closure_row(c, a, 3) : tlsphi_closure_row(c, a, 1);
+    c->sums[2 * i] = sum;
 }
-/* z = inverse block times r, for one component. */
-static void tlsphi_closure_precondition(const tlsphi_closer *c, size_t a, size_t j, double z[4]) {
-    const size_t rows = c->rows;
-    const double *r = c->r + c->width * a + rows * j, *M = c->block + rows * rows * a;
-    if (c->balances) { /* the diagonal, about: only l moves */
-        memset(z, 0, 4 * sizeof *z);
-        z[0] = M[0] * r[0];
-        return;
-    }
-    for (size_t k = 0; k < rows; k++) {
-        z[k] = 0;
-        for (size_t l = 0; l < rows; l++) z[k] += M[rows * k + l] * r[l];
-    }
-}
-/* x += step p, r -= step q; sums of r.z, largest |r|. */
+/* x += step p, r -= step q, q = inverse block times r; sum of r.q, largest r^2. */
 static void tlsphi_closure_update_task(void *arg, size_t i) {
     tlsphi_closer *c = (tlsphi_closer *)arg;
-    const size_t begin = i * TLSPHI_CLOSURE_BLOCK;
-    double *sums = c->sums + 4 * i, z[4];
-    sums[0] = sums[1] = sums[2] = sums[3] = 0;
-    for (size_t a = begin; a < begin + TLSPHI_CLOSURE_BLOCK && a < c->n; a++)
-        for (size_t j = 0; j < (size_t)c->plan->dim; j++) {
-            const size_t at = c->width * a + c->rows * j;
-            for (size_t k = at; k < at + c->rows; k++) {
-                c->x[k] += c->step[j] * c->p[k];
-                c->r[k] -= c->step[j] * c->q[k];
-                if (k == at || !c->balances) sums[3] = tlsphi_dmax(sums[3], fabs(c->r[k]) / c->area[a]);
-            }
-            tlsphi_closure_precondition(c, a, j, z);
-            for (size_t k = 0; k < c->rows; k++) sums[j] += z[k] * c->r[at + k];
+    const size_t begin = i * TLSPHI_CLOSURE_BLOCK, rows = c->rows;
+    double sum = 0, most = 0;
+    for (size_t a = begin; a < begin + TLSPHI_CLOSURE_BLOCK && a < c->n; a++) {
+        double *x = c->x + 4 * rows * a, *r = c->r + 4 * rows * a, *p = c->p + 4 * rows * a, *q = c->q + 4 * rows * a;
+        const double *scale = c->slack[a] + 4;
+        double size[2] = {0, 0};
+        for (size_t k = 0; k < 4 * rows; k++) {
+            x[k] += c->step * p[k];
+            r[k] -= c->step * q[k];
+            size[k >= 4] += r[k] * r[k];
         }
+        for (size_t k = 0; k < rows; k++) {
+            double z[4] = {0, 0, 0, 0};
+            for (size_t l = 0; l < rows; l++) {
+                const double M = (double)c->block[a][4 * k + l];
+                TLSPHI_LANES z[j] += M * r[4 * l + (size_t)j];
+            }
+            for (size_t j = 0; j < 4; j++) sum += (q[4 * k + j] = z[j]) * r[4 * k + j];
+        }
+        for (int k = 0; k < 2; k++) most = tlsphi_dmax(most, size[k] / (scale[k] * scale[k]));
+    }
+    c->sums[2 * i] = sum;
+    c->sums[2 * i + 1] = most;
 }
-/* p = z + beta p */
+/* p = q + beta p */
 static void tlsphi_closure_direction_task(void *arg, size_t i) {
     tlsphi_closer *c = (tlsphi_closer *)arg;
-    const size_t begin = i * TLSPHI_CLOSURE_BLOCK;
-    double z[4];
-    for (size_t a = begin; a < begin + TLSPHI_CLOSURE_BLOCK && a < c->n; a++)
-        for (size_t j = 0; j < (size_t)c->plan->dim; j++) {
-            double *p = c->p + c->width * a + c->rows * j;
-            tlsphi_closure_precondition(c, a, j, z);
-            for (size_t k = 0; k < c->rows; k++) p[k] = z[k] + c->beta[j] * p[k];
-        }
+    const size_t begin = i * TLSPHI_CLOSURE_BLOCK, end = begin + TLSPHI_CLOSURE_BLOCK;
+    for (size_t k = 4 * c->rows * begin; k < 4 * c->rows * (end < c->n ? end : c->n); k++) c->p[k] = c->q[k] + c->beta * c->p[k];
 }
-static void tlsphi_closure_run(tlsphi_closer *c, tlsph_task_fn task, double sums[4]) {
+/* Returns the tasks' sum; most: the largest residual. */
+static double tlsphi_closure_run(tlsphi_closer *c, tlsph_task_fn task, double *most) {
     const tlsph_desc *d = c->plan->desc;
+    double sum = 0;
     tlsphi_parallel(d->run, d->run_user, d->threads, task, c, c->tasks);
-    for (int j = 0; j < 4; j++) sums[j] = 0;
-    for (size_t i = 0; i < c->tasks; i++) {
-        for (size_t j = 0; j < 3; j++) sums[j] += c->sums[4 * i + j];
-        sums[3] = tlsphi_dmax(sums[3], c->sums[4 * i + 3]);
-    }
+    for (size_t i = 0; i < c->tasks; i++) sum += c->sums[2 * i];
+    for (size_t i = 0; most && i < c->tasks; i++) *most = tlsphi_dmax(i ? *most : 0, sqrt(c->sums[2 * i + 1]));
+    return sum;
 }
 /* Until the largest residual meets the limit; r is the residual of x. */
-static tlsph_result tlsphi_closure_iterate(tlsphi_closer *c, double limit) {
-    double rz[4], pq[4], old[3] = {0, 0, 0}, unused[4];
-    tlsph_closure *report = &c->plan->closure;
-    for (int j = 0; j < 3; j++) c->step[j] = 0;
-    memset(c->p, 0, c->n * c->width * sizeof *c->p);
-    memset(c->q, 0, c->n * c->width * sizeof *c->q);
-    tlsphi_closure_run(c, tlsphi_closure_update_task, rz);
-    for (; rz[3] > limit; report->iterations++) {
-        for (int j = 0; j < c->plan->dim; j++) c->beta[j] = old[j] > 0 ? rz[j] / old[j] : 0;
-        tlsphi_closure_run(c, tlsphi_closure_direction_task, unused);
-        tlsphi_closure_run(c, tlsphi_closure_product_task, pq);
-        for (int j = 0; j < c->plan->dim; j++) {
-            c->step[j] = pq[j] > 0 ? rz[j] / pq[j] : 0;
-            old[j] = rz[j];
-        }
-        tlsphi_closure_run(c, tlsphi_closure_update_task, rz);
-        if (report->iterations >= TLSPHI_CLOSURE_STEPS || !(rz[3] < 1e30))
-            return tlsphi_plan_fail(c->plan, TLSPH_ERROR_NEIGHBOURS, "residual of the closure", TLSPH_NO_PARTICLE, rz[3],
+static tlsph_result tlsphi_closure_iterate(tlsphi_closer *c, double limit, double *residual) {
+    double old = 0, rz;
+    c->step = 0;
+    memset(c->p, 0, 4 * c->rows * c->n * sizeof *c->p);
+    memset(c->q, 0, 4 * c->rows * c->n * sizeof *c->q);
+    rz = tlsphi_closure_run(c, tlsphi_closure_update_task, residual);
+    for (int steps = 0; *residual > limit; steps++, c->plan->closure.iterations++) {
+        c->beta = old > 0 ? rz / old : 0;
+        tlsphi_closure_run(c, tlsphi_closure_direction_task, NULL);
+        const double pq = tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
+        c->step = pq > 0 ? rz / pq : 0;
+        old = rz;
+        rz = tlsphi_closure_run(c, tlsphi_closure_update_task, residual);
+        if (steps >= TLSPHI_CLOSURE_STEPS || !(*residual < 1e15))
+            return tlsphi_plan_fail(c->plan, TLSPH_ERROR_NEIGHBOURS, "residual of the closure", TLSPH_NO_PARTICLE, *residual,
                                     limit, "a cloud whose volumes and areas belong together");
     }
-    if (!c->balances) report->residual = rz[3];
     return TLSPH_OK;
+}
+/* What is missing of sum C + B for the unknowns in p: component j of grid particle i. Follows a product. */
+static double tlsphi_closure_open(const tlsphi_closer *c, size_t i, size_t j) {
+    const size_t D = (size_t)c->plan->dim;
+    const double B = j < D ? (double)c->plan->desc->particles.areas[3 * c->plan->grid.order[i] + j] : 0;
+    return -B / pow(c->unit, (double)D - 1) - c->q[4 * c->rows * i + j];
+}
+/* The last word: l alone, packed into the memory of p. */
+static tlsph_result tlsphi_closure_balance(tlsphi_closer *c) {
+    tlsphi_closer packed = *c;
+    const size_t size = 4 * c->n;
+    double residual;
+    for (size_t i = 0; i < c->n; i++) {
+        double sum = 0;
+        for (size_t k = c->first[i]; k < c->first[i + 1]; k++) sum += (double)c->pair[k][0];
+        c->block[i][0] = (float)(1 / sum);
+    }
+    memcpy(c->p, c->x, c->rows * size * sizeof *c->p);
+    tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
+    for (size_t i = 0; i < size; i++) c->r[i] = tlsphi_closure_open(c, i / 4, i % 4);
+    packed.rows = 1;
+    packed.x = c->p;
+    packed.p = c->p + size;
+    packed.q = c->p + 2 * size;
+    memset(packed.x, 0, size * sizeof *packed.x);
+    const tlsph_result r = tlsphi_closure_iterate(&packed, TLSPHI_CLOSURE_BALANCE, &residual);
+    for (size_t i = 0; i < size; i++) c->x[c->rows * (i - i % 4) + i % 4] += packed.x[i];
+    return r;
 }
 
 /* Inverse of a symmetric positive matrix of size 3 or 4 by Gauss-Jordan without pivots. */
@@ -2426,33 +2424,36 @@ static void tlsphi_closure_invert(size_t n, double *A) {
         }
     }
 }
-/* Blocks, slack and the start m of grid particle i; moment: sum w d (x) d, padded to 3x3. */
-static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double m[9]) {
+/* Block and slack of grid particle i, and its start: m, row by row, into out. */
+static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double *out) {
     tlsphi_plan *plan = c->plan;
     const size_t D = (size_t)plan->dim, rows = c->rows, a = plan->grid.order[i];
     const tlsph_real *B = plan->desc->particles.areas + 3 * a;
-    const double BB = (double)tlsphi_dot(plan->dim, B, B), V = tlsphi_plan_volume(plan, a) / pow(c->unit, (double)D);
+    const double BB = (double)tlsphi_dot(plan->dim, B, B), volume = pow(c->unit, (double)D);
     const double h = tlsphi_pair_h(plan, a, a) / (double)plan->desc->support / c->unit;
-    double *block = c->block + rows * rows * i, *slack = c->slack + rows * i, moment[9] = {0}, sum = 0;
-    memset(block, 0, rows * rows * sizeof *block);
+    double block[16] = {0}, moment[9] = {0}, m[9], *slack = c->slack[i];
     if (D == 2) moment[8] = 1;
     for (size_t k = c->first[i]; k < c->first[i + 1]; k++) {
-        const double *pair = c->pair + rows * k, w = pair[0];
-        sum += w;
-        for (size_t j = 1; j < rows; j++) block[j] = block[rows * j] += w * pair[j];
-        for (size_t j = 0; j < D * D; j++) moment[3 * (j / D) + j % D] += w * pair[1 + j / D] * pair[1 + j % D];
+        const float *pair = c->pair[k];
+        for (size_t j = 0; j < rows * rows; j++)
+            block[j] += (double)pair[0] * (j / rows ? (double)pair[j / rows] : 1) * (j % rows ? (double)pair[j % rows] : 1);
     }
+    for (size_t j = 0; j < D * D; j++) moment[3 * (j / D) + j % D] = block[rows * (1 + j / D) + 1 + j % D];
     const tlsph_result r = tlsphi_correct(plan, a, moment, c->first[i + 1] - c->first[i], m);
     if (r) return r;
-    c->area[i] = D == 3 ? h * h : h;
-    const double share = tlsphi_dmin(1, V / (c->area[i] * h)), area = BB > 0 ? TLSPHI_CLOSURE_AREA * sum : 0;
-    slack[D] = (c->second ? TLSPHI_CLOSURE_REST : TLSPHI_CLOSURE_SLACK * share * share) * sum * h * h;
-    for (size_t j = 0; j < D; j++)
-        slack[j] = c->second ? TLSPHI_CLOSURE_HOLD * sum : BB > 0 ? area * (double)(B[j] * B[j]) / BB : 0;
-    block[0] = sum + (c->second ? slack[0] : area / (double)D);
-    for (size_t j = 0; j < D * D; j++)
-        block[rows * (1 + j / D) + 1 + j % D] = moment[3 * (j / D) + j % D] + (j % (D + 1) ? 0 : slack[D]);
+    for (size_t j = 0; j < 4 * rows; j++) out[j] = 0;
+    for (size_t j = 0; j < D * D; j++) out[4 * (1 + j % D) + j / D] = m[j] / volume;
+    slack[4] = D == 3 ? h * h : h;
+    slack[5] = 2 * tlsphi_plan_volume(plan, a) / volume;
+    const double sum = block[0], share = tlsphi_dmin(1, slack[5] / (2 * slack[4] * h));
+    const double area = BB > 0 ? TLSPHI_CLOSURE_AREA * sum : 0;
+    for (size_t j = 0; j < 3; j++) slack[j] = j < D && BB > 0 ? sqrt(area / BB) * (double)B[j] : 0;
+    slack[6] = c->first[i + 1] - c->first[i] <= D + 1 ? area : 0;
+    slack[3] = TLSPHI_CLOSURE_SLACK * c->eased * share * share * sum * h * h;
+    block[0] += area / (double)D;
+    for (size_t j = 1; j < rows; j++) block[(rows + 1) * j] += slack[3];
     tlsphi_closure_invert(rows, block);
+    for (size_t j = 0; j < rows * rows; j++) c->block[i][4 * (j / rows) + j % rows] = (float)block[j];
     return TLSPH_OK;
 }
 /* Neighbour lists in grid order, with w and d in units of the spacing. */
@@ -2474,8 +2475,8 @@ static tlsph_result tlsphi_closure_lists(tlsphi_closer *c, uint32_t *sorted, uin
                 return tlsphi_plan_fail(plan, TLSPH_ERROR_DUPLICATE, "same place as particle", a, (double)list[k], 0,
                                         "distinct positions");
             c->list[at] = sorted[list[k]];
-            c->pair[c->rows * at] = gd / rr / pow(c->unit, (double)D - 2);
-            for (size_t j = 0; j < D; j++) c->pair[c->rows * at + 1 + j] = d[j] / c->unit;
+            c->pair[at][0] = (float)(gd / rr / pow(c->unit, (double)D - 2));
+            for (size_t j = 0; j < D; j++) c->pair[at][1 + j] = (float)(d[j] / c->unit);
             tlsphi_join(parent, (uint32_t)a, list[k]);
             at++;
         }
@@ -2514,115 +2515,91 @@ static tlsph_result tlsphi_closure_parts(tlsphi_closer *c, uint32_t *parent, dou
     }
     return TLSPH_OK;
 }
-/* The right-hand side for the start: x holds it while r is made. */
+/* The start in x, and its residual. */
 static tlsph_result tlsphi_closure_start(tlsphi_closer *c) {
-    tlsphi_plan *plan = c->plan;
-    const size_t D = (size_t)plan->dim, rows = c->rows;
-    const double area = pow(c->unit, (double)D - 1), volume = pow(c->unit, (double)D);
-    double sums[4];
-    memset(c->p, 0, c->n * c->width * sizeof *c->p); /* the start has l = 0; the sums of the parts were there */
+    const size_t D = (size_t)c->plan->dim, rows = c->rows;
     for (size_t i = 0; i < c->n; i++) {
-        double m[9];
-        const tlsph_result r = tlsphi_closure_particle(c, i, m);
+        const tlsph_result r = tlsphi_closure_particle(c, i, c->p + 4 * rows * i);
         if (r) return r;
-        for (size_t j = 0; j < D * D; j++) c->p[c->width * i + rows * (j / D) + 1 + j % D] = m[j] / volume;
     }
-    tlsphi_closure_run(c, tlsphi_closure_product_task, sums);
+    tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
     for (size_t i = 0; i < c->n; i++) {
-        const size_t a = plan->grid.order[i];
-        const double V = tlsphi_plan_volume(plan, a) / volume;
-        for (size_t j = 0; j < D; j++) {
-            const size_t at = c->width * i + rows * j;
-            c->r[at] = -(double)plan->desc->particles.areas[3 * a + j] / area - c->q[at];
-            for (size_t k = 1; k < rows; k++) /* slack holds for the change from the start */
-                c->r[at + k] = (k == j + 1 ? 2 * V : 0) - c->q[at + k] + c->slack[rows * i + D] * c->p[at + k];
-        }
+        const double *p = c->p + 4 * rows * i, *q = c->q + 4 * rows * i;
+        for (size_t j = 0; j < 4 * rows; j++) /* slack holds for the change from the start */
+            c->r[4 * rows * i + j] = j < 4 ? tlsphi_closure_open(c, i, j)
+                                           : (j % 5 == 4 && j / 5 < D ? c->slack[i][5] : 0) - q[j] + c->slack[i][3] * p[j];
     }
-    memcpy(c->x, c->p, c->n * c->width * sizeof *c->x);
+    memcpy(c->x, c->p, 4 * rows * c->n * sizeof *c->x);
     return TLSPH_OK;
 }
-/* What the volumes' slack has taken from linear fields, in the worst particle. */
-static double tlsphi_closure_defect(tlsphi_closer *c) {
-    const size_t D = (size_t)c->plan->dim, rows = c->rows;
-    const double volume = pow(c->unit, (double)D);
-    double worst = 0;
-    for (size_t i = 0; i < c->n; i++) {
-        const double V = tlsphi_plan_volume(c->plan, c->plan->grid.order[i]) / volume;
-        double m[9];
-        tlsphi_closure_particle(c, i, m); /* the start once more */
-        for (size_t j = 0; j < D * D; j++) {
-            const size_t at = c->width * i + rows * (j / D) + 1 + j % D;
-            worst = tlsphi_dmax(worst, c->slack[rows * i + D] * fabs(c->x[at] - m[j] / volume) / (2 * V));
-        }
-    }
-    return worst;
-}
-/* From the first solution to the second: what slack there was is residual now. */
+/* From the first solution to the second, if linear fields need it: what slack is given up is residual then. */
 static tlsph_result tlsphi_closure_tighten(tlsphi_closer *c) {
-    const size_t D = (size_t)c->plan->dim, rows = c->rows;
-    const double volume = pow(c->unit, (double)D);
-    c->second = 1;
-    for (size_t i = 0; i < c->n; i++) {
-        double m[9], slack = c->slack[rows * i + D];
-        const tlsph_result r = tlsphi_closure_particle(c, i, m);
-        if (r) return r;
-        for (size_t j = 0; j < D * D; j++) {
-            const size_t at = c->width * i + rows * (j / D) + 1 + j % D;
-            c->r[at] += slack * (c->x[at] - m[j] / volume);
+    const int tight = c->plan->desc->tight_closure;
+    double worst = 0, residual = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (size_t i = 0; i < c->n; i++) {
+            const size_t at = 4 * c->rows * i;
+            double start[16], before = c->slack[i][3];
+            const tlsph_result r = tlsphi_closure_particle(c, i, start);
+            if (r) return r;
+            for (size_t j = 4; j < 4 * c->rows; j++) {
+                const double change = c->x[at + j] - start[j];
+                worst = tlsphi_dmax(worst, before * fabs(change) / c->slack[i][5]);
+                c->r[at + j] += (before - c->slack[i][3]) * change;
+            }
         }
+        if (!tight && !(worst > TLSPHI_CLOSURE_DEFECT)) return TLSPH_OK;
+        c->eased = tight ? 0.01 : 0.1;
     }
-    return TLSPH_OK;
+    return tlsphi_closure_iterate(c, tight ? TLSPHI_CLOSURE_TIGHT : TLSPHI_CLOSURE_LIMIT, &residual);
 }
-/* C_ab in the host's order; how far it is from the start, and how well the conditions hold. */
+/* C_ab in the host's order; how far it is from the start (in p), and how well the conditions hold. */
 static void tlsphi_closure_store(tlsphi_closer *c, size_t *first, uint32_t *list, double *C) {
     tlsphi_plan *plan = c->plan;
-    const size_t D = (size_t)plan->dim, rows = c->rows;
+    tlsph_closure *report = &plan->closure;
+    const size_t D = (size_t)plan->dim, width = 4 * c->rows;
     const double area = pow(c->unit, (double)D - 1);
     double start_sum = 0;
     for (size_t i = 0; i < c->n; i++) {
-        double m[9];
         first[plan->grid.order[i] + 1] = c->first[i + 1] - c->first[i];
-        tlsphi_closure_particle(c, i, m); /* the start once more, for comparison */
-        for (size_t j = 0; j < D * D; j++) c->p[c->width * i + rows * (j / D) + 1 + j % D] = m[j] / (area * c->unit);
-        for (size_t j = 0; j < D; j++) c->p[c->width * i + rows * j] = 0;
+        tlsphi_closure_particle(c, i, c->p + width * i);
     }
     for (size_t a = 0; a < c->n; a++) first[a + 1] += first[a];
     for (size_t i = 0; i < c->n; i++) {
         const size_t a = plan->grid.order[i];
-        const double V = tlsphi_plan_volume(plan, a) / (area * c->unit);
-        double sum[12] = {0};
+        double sum[16] = {0};
         for (size_t k = c->first[i], at = first[a]; k < c->first[i + 1]; k++, at++) {
-            const double *pair = c->pair + rows * k, *xa = c->x + c->width * i, *xb = c->x + c->width * c->list[k];
-            const double *pa = c->p + c->width * i, *pb = c->p + c->width * c->list[k];
+            const double *x[2] = {c->x + width * i, c->x + width * c->list[k]};
+            const double *p[2] = {c->p + width * i, c->p + width * c->list[k]};
             double change = 0, size = 0;
             list[at] = plan->grid.order[c->list[k]];
-            for (size_t j = 0; j < D; j++, xa += rows, xb += rows, pa += rows, pb += rows) {
-                double X = xa[0] - xb[0], start = 0;
-                for (size_t l = 1; l < rows; l++) {
-                    X += (xa[l] + xb[l]) * pair[l];
-                    start += (pa[l] + pb[l]) * pair[l];
+            for (size_t j = 0; j < D; j++) {
+                double X = x[0][j] - x[1][j], start = 0;
+                for (size_t l = 1; l <= D; l++) {
+                    X += (x[0][4 * l + j] + x[1][4 * l + j]) * (double)c->pair[k][l];
+                    start += (p[0][4 * l + j] + p[1][4 * l + j]) * (double)c->pair[k][l];
                 }
-                X *= pair[0];
-                start *= pair[0];
+                X *= (double)c->pair[k][0];
+                start *= (double)c->pair[k][0];
                 change += (X - start) * (X - start);
                 size += start * start;
                 C[D * at + j] = X * area;
-                sum[rows * j] += X;
-                for (size_t l = 1; l < rows; l++) sum[rows * j + l] += X * pair[l] / 2;
+                sum[j] += X;
+                for (size_t l = 1; l <= D; l++) sum[4 * l + j] += X * (double)c->pair[k][l];
             }
             start_sum += sqrt(size);
-            plan->closure.change_mean += sqrt(change);
-            plan->closure.change_largest = tlsphi_dmax(plan->closure.change_largest, sqrt(change));
+            report->change_mean += sqrt(change);
+            report->change_largest = tlsphi_dmax(report->change_largest, sqrt(change));
         }
         for (size_t j = 0; j < D; j++) {
             const double B = (double)plan->desc->particles.areas[3 * a + j] / area;
-            plan->closure.closing = tlsphi_dmax(plan->closure.closing, fabs(sum[rows * j] + B) / c->area[i]);
-            for (size_t l = 1; l < rows; l++)
-                plan->closure.linear = tlsphi_dmax(plan->closure.linear, fabs(sum[rows * j + l] / V - (l == j + 1)));
+            report->closing = tlsphi_dmax(report->closing, fabs(sum[j] + B) / c->slack[i][4]);
+            for (size_t l = 0; l < D; l++)
+                report->linear = tlsphi_dmax(report->linear, fabs(sum[4 * (l + 1) + j] / c->slack[i][5] - (l == j)));
         }
     }
-    plan->closure.change_largest *= (double)plan->pairs / start_sum;
-    plan->closure.change_mean /= start_sum;
+    report->change_largest *= (double)plan->pairs / start_sum;
+    report->change_mean /= start_sum;
 }
 static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, uint32_t *list, double *g) {
     tlsphi_closer closer, *c = &closer;
@@ -2632,32 +2609,27 @@ static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, ui
     c->plan = plan;
     c->n = n;
     c->rows = D + 1;
-    c->width = c->rows * D;
     c->tasks = (n + TLSPHI_CLOSURE_BLOCK - 1) / TLSPHI_CLOSURE_BLOCK;
+    c->eased = 1;
     c->unit = plan->h / (double)plan->desc->support;
     uint32_t *sorted = TLSPHI_SCRATCH(plan, uint32_t, n), *host_list = TLSPHI_SCRATCH(plan, uint32_t, plan->pairs);
     size_t *host_first = TLSPHI_SCRATCH(plan, size_t, n + 1);
     double *C = TLSPHI_SCRATCH(plan, double, D *plan->pairs);
     c->first = TLSPHI_SCRATCH(plan, size_t, n + 1);
     c->list = TLSPHI_SCRATCH(plan, uint32_t, plan->pairs);
-    c->pair = TLSPHI_SCRATCH(plan, double, c->rows *plan->pairs);
+    c->pair = (float (*)[4])tlsphi_scratch_take(plan, plan->pairs, sizeof *c->pair);
     double **const vectors[4] = {&c->x, &c->r, &c->p, &c->q};
-    for (int i = 0; i < 4; i++) *vectors[i] = TLSPHI_SCRATCH(plan, double, c->width *n);
-    c->block = TLSPHI_SCRATCH(plan, double, c->rows *c->rows *n);
-    c->slack = TLSPHI_SCRATCH(plan, double, c->rows *n);
-    c->area = TLSPHI_SCRATCH(plan, double, n);
-    c->sums = TLSPHI_SCRATCH(plan, double, 4 * c->tasks);
+    for (int i = 0; i < 4; i++) *vectors[i] = TLSPHI_SCRATCH(plan, double, 4 * c->rows *n);
+    c->block = (float (*)[16])tlsphi_scratch_take(plan, n, sizeof *c->block);
+    c->slack = (double (*)[7])tlsphi_scratch_take(plan, n, sizeof *c->slack);
+    c->sums = TLSPHI_SCRATCH(plan, double, 2 * c->tasks);
     if (!sorted || !host_list || !host_first || !C || !c->first || !c->list || !c->pair || !c->x || !c->r || !c->p || !c->q ||
-        !c->block || !c->slack || !c->area || !c->sums)
-        return tlsphi_no_memory(plan, 500.0 * (double)n + 60.0 * (double)plan->pairs);
+        !c->block || !c->slack || !c->sums)
+        return tlsphi_no_memory(plan, 640.0 * (double)n + 48.0 * (double)plan->pairs);
     if ((r = tlsphi_closure_lists(c, sorted, parent, list, g)) || (r = tlsphi_closure_parts(c, parent, c->p)) ||
-        (r = tlsphi_closure_start(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_LIMIT)))
+        (r = tlsphi_closure_start(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_LIMIT, &plan->closure.residual)) ||
+        (r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_balance(c)))
         return r;
-    if ((plan->desc->tight_closure || tlsphi_closure_defect(c) > TLSPHI_CLOSURE_DEFECT) &&
-        ((r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_TIGHT))))
-        return r;
-    c->balances = 1;
-    if ((r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_BALANCE))) return r;
     tlsphi_closure_store(c, host_first, host_list, C);
     plan->closed_first = host_first;
     plan->closed_list = host_list;

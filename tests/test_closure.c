@@ -190,7 +190,7 @@ TEST(closed_antisymmetric_exact)
             tlsph_closure_read(solver, &report);
             tlsph_operator_view(solver, &view);
             check_operator(&view, report.linear);
-            CHECK(report.iterations > 0 && report.residual <= 1e-3 && report.change_mean > 0);
+            CHECK(report.iterations > 0 && report.residual <= 1e-2 && report.change_mean > 0);
             tlsph_destroy(solver);
             tlsph_cloud_destroy(&cloud);
         }

@@ -216,8 +216,8 @@ TEST(renumbered_clouds_agree)
             sum[1] += pow((double)(v[0][3 * a + i] - v[1][3 * (n - 1 - a) + i]), 2);
             sum[2] += pow((double)v[0][3 * a + i] - back, 2);
         }
-    CHECK_BELOW(sqrt(sum[1] / sum[0]), 1e-3);
-    CHECK_BELOW(sqrt(sum[2] / sum[0]), 5e-3);
+    CHECK_BELOW(sqrt(sum[1] / sum[0]), 1e-8);
+    CHECK_BELOW(sqrt(sum[2] / sum[0]), 1e-5);
     REPORT("reversed %.1e, turned %.1e", sqrt(sum[1] / sum[0]), sqrt(sum[2] / sum[0]));
     for (int k = 0; k < 3; k++) free(v[k]);
     free(X); free(B); free(V);
