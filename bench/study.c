@@ -45,7 +45,7 @@ static const choice in_float[] = { { "", "", "float", ON_ALL }, { "26", "26", "f
 enum { CHOICES = sizeof choices / sizeof *choices, IN_FLOAT = sizeof in_float / sizeof *in_float };
 
 /* Run at several resolutions for the fronts; the full study crosses operators, steps, dissipation and unknowns. */
-static const char *const candidates[] = { "", "fast", "balanced", "accurate", "cells4 rk3", "cells4 rk4" };
+static const char *const candidates[] = { "", "fast", "balanced", "accurate", "sharp rk3 split", "sharp rk4 split" };
 enum { CANDIDATES = sizeof candidates / sizeof *candidates };
 static const char *const operators[] = { "", "sharp", "cells4", "26", "26 cubic" };
 static const char *const integrators[] = { "", "ssprk3", "rk3", "rk4" };

@@ -101,7 +101,8 @@ int scene_options_preset(scene_options *options, const char *name) {
 
 void scene_options_cloud(scene_options *options, tlsph_fill *fill) {
     options->sharp = 0;
-    if (options->operator_kind != TLSPH_CORRECTED_KERNEL && !options->preset) return; /* a preset chose for lattices */
+    const int chosen = options->preset && (options->operator_kind == TLSPH_CELLS || options->operator_kind == TLSPH_CELLS_4);
+    if (options->operator_kind != TLSPH_CORRECTED_KERNEL && !chosen) return; /* the preset's choice was for lattices */
     options->operator_kind = TLSPH_CLOSED;
     options->kernel = TLSPH_WENDLAND_C2;
     options->support = 0.825;
