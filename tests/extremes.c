@@ -126,6 +126,15 @@ static tlsph_condition *rig_add(rig *r, tlsph_condition_kind kind, int axis, dou
     c->normal[axis] = 1;
     return c;
 }
+/* The second material for X > 1/2; the list must live until rig_create and is the caller's. */
+static uint8_t *rig_two_materials(rig *r) {
+    tlsph_particles *p = &r->body.cloud.particles;
+    uint8_t *materials = calloc(p->count + 1, 1);
+    if (!materials) abort();
+    for (size_t a = 0; a < p->count; a++) materials[a] = (double)p->positions[3 * a] > 0.5;
+    p->materials = materials;
+    return materials;
+}
 static tlsph_result rig_create(rig *r) {
     if (!r->body.cloud.particles.count && !r->result) rig_fill(r);
     r->desc.particles = r->body.cloud.particles;
@@ -174,7 +183,7 @@ static void lively(const void *scene, const tlsph_real X[3], scene_state *state)
 
 /* ---- deformation ------------------------------------------------------------------------------------------------- */
 
-/* Elongation (%) of a clamped column of 2 x 2 x 12 cells at which the pull fails; `most` if it does not. */
+/* Elongation (%) of a clamped column of 2 x 2 x 12 cells at which the pull fails, or ends: `most`. */
 static double pulled_until(tlsph_unknowns unknowns, double nu, double most) {
     pulled_column_parameters p;
     pulled_column column;
@@ -192,8 +201,8 @@ static double pulled_until(tlsph_unknowns unknowns, double nu, double most) {
     return reached;
 }
 static void pull(void) {
-    at_least("column pulled, {p,F}, nu 0.45", pulled_until(TLSPH_PF, 0.45, 1100), 2 * 526.8, "%", "papers: 422 to 527");
-    at_least("column pulled, {p,F,J}, nu 0.495", pulled_until(TLSPH_PFJ, 0.495, 1000), 2 * 464.5, "%", "papers: 428 to 465");
+    at_least("column pulled, {p,F}, nu 0.45", pulled_until(TLSPH_PF, 0.45, 1060), 2 * 526.8, "%", "papers: 422 to 527");
+    at_least("column pulled, {p,F,J}, nu 0.495", pulled_until(TLSPH_PFJ, 0.495, 935), 2 * 464.5, "%", "papers: 428 to 465");
 }
 
 /* 1 if the column that starts to twist at omega is whole and without gain of energy at t = 0.1 s. */
@@ -348,37 +357,49 @@ static void lively_plane(const void *scene, const tlsph_real X[3], scene_state *
     state->v[2] = 0;
     state->theta += 20 * sin(1.5 * (double)X[0] + (double)X[1]);
 }
-static void million_row(const char *name, double speed, tlsph_integrator integrator, long steps) {
+static double length2(const double x[2]) { return sqrt(x[0] * x[0] + x[1] * x[1]); }
+/* Angular momentum about the centre of mass. */
+static double own_spin(const tlsph_ledger *l) {
+    return l->angular_momentum[2] - l->centre[0] * l->linear_momentum[1] + l->centre[1] * l->linear_momentum[0];
+}
+/* A thermoelastic body with J that vibrates and turns, and flies off by a thousand of its sizes in a million steps. A common
+   drift of all J is no jump that the dissipation sees: it stays, unless drift_relaxation takes it away. */
+static void million_row(const char *name, double speed, double relaxation, double drift, tlsph_integrator integrator,
+                        long steps) {
     rig r;
-    rig_begin(&r, 3, 3, 0, 0.25);
+    const int cells = speed > 0 ? 3 : 2;
+    rig_begin(&r, cells, cells, 0, 0.25);
     r.materials[0].kind = TLSPH_MIE_GRUNEISEN;
     r.materials[0].expansion = R(1e-3);
     r.materials[0].conductivity = R(1e-4);
     r.desc.unknowns = TLSPH_PFJ;
     r.desc.thermal = TLSPH_ENERGY;
     r.desc.integrator = integrator;
+    r.desc.drift_relaxation = R(relaxation);
     rig_create(&r);
     if (speed > 0) rig_state(&r, &speed, lively_plane);
     const tlsph_ledger first = rig_ledger(&r);
     rig_steps(&r, steps);
     const tlsph_ledger last = rig_ledger(&r);
     const double scale = first.mass * (speed > 0 ? speed : 1), heat = 300 * first.mass;
-    double momentum = fabs(last.angular_momentum[2] - first.angular_momentum[2]);
+    double momentum = fabs(own_spin(&last) - own_spin(&first));
     for (int i = 0; i < 2; i++) momentum = fmax(momentum, fabs(last.linear_momentum[i] - first.linear_momentum[i]));
     at_least(text("%s: steps", name), (double)last.step, (double)steps, "", rig_message(&r));
     at_most(text("%s: energy, change by c_v theta", name), fabs(last.energy_residual) / heat, IS_FLOAT ? 1e-3 : 1e-11, "",
             text("kinetic %.2g of %.2g left", last.kinetic_energy, first.kinetic_energy));
     at_most(text("%s: momenta, change by m v", name), momentum / scale, IS_FLOAT ? 1e-3 : 1e-11, "", "");
-    at_most(text("%s: J / det F - 1", name), last.drift_largest, IS_FLOAT ? 1e-4 : 1e-8, "", "");
+    at_most(text("%s: J / det F - 1", name), last.drift_largest, drift, "",
+            text("%.0f body sizes away", length2(last.centre) / 0.75));
     rig_end(&r);
 }
 static void million(void) {
-    million_row("a million steps at rest", 0, TLSPH_RK2, 1000000);
-    million_row("a million steps of vibration", 0.2, TLSPH_RK3_FROZEN, 1000000);
+    million_row("a million steps at rest", 0, 0, 10 * EPSILON, TLSPH_RK2, 1000000);
+    million_row("a million steps of vibration", 0.2, 0, IS_FLOAT ? 0.05 : 0.02, TLSPH_RK3_FROZEN, 1000000);
 }
 static void thousands(void) {
-    million_row("ten thousand steps at rest", 0, TLSPH_RK2, 10000);
-    million_row("ten thousand steps of vibration", 0.2, TLSPH_RK3_FROZEN, 10000);
+    million_row("ten thousand steps at rest", 0, 0, 10 * EPSILON, TLSPH_RK2, 10000);
+    million_row("ten thousand steps of vibration", 0.2, 0, 0.01, TLSPH_RK3_FROZEN, 10000);
+    million_row("ten thousand, drift_relaxation 0.5", 0.2, 0.5, 2e-3, TLSPH_RK3_FROZEN, 10000);
 }
 
 /* ---- time step --------------------------------------------------------------------------------------------------- */
@@ -588,15 +609,22 @@ static void thermal_rig(rig *r, tlsph_material_kind kind, tlsph_thermal thermal,
     r->materials[0].conductivity = R(h);
     r->desc.thermal = thermal;
 }
-/* Conduction alone between 1 and `ratio` times 0.3 K in a held body: temperatures must stay between these. */
-static void heat_jump(const char *name, double ratio, tlsph_thermal thermal, int stages) {
+/* Conduction alone between 1 and `ratio` times 0.3 K in a held body, the hot half of which conducts `contrast` times as well and
+   holds a `contrast`-th of the heat: temperatures must stay between these. */
+static void heat_jump(const char *name, double ratio, double contrast, int stages) {
     const double theta[2] = { 0.3, 0.3 * ratio };
     rig r;
-    thermal_rig(&r, TLSPH_MIE_GRUNEISEN, thermal, 0, 0.05);
+    thermal_rig(&r, TLSPH_MIE_GRUNEISEN, TLSPH_ENERGY, 0, 0.05);
+    r.materials[1] = r.materials[0];
+    r.materials[1].conductivity *= R(contrast);
+    r.materials[1].specific_heat /= R(contrast);
     r.desc.conduction_stages = stages;
     rig_fill(&r);
+    uint8_t *materials = rig_two_materials(&r);
     rig_add(&r, TLSPH_CLAMPED, -1, 0);
     rig_create(&r);
+    r.body.cloud.particles.materials = NULL;
+    free(materials);
     rig_state(&r, theta, two_temperatures);
     double beyond = 0;
     for (int i = 0; i < 200 && !r.result; i++) {
@@ -607,7 +635,7 @@ static void heat_jump(const char *name, double ratio, tlsph_thermal thermal, int
     const tlsph_ledger l = rig_ledger(&r);
     at_most(text("%s: beyond the extremes", name), r.result ? HUGE_VAL : beyond, 1e2 * EPSILON, "",
             text("%.4g to %.4g K after 200 steps; %s", l.temperature_least, l.temperature_largest, rig_message(&r)));
-    at_most(text("%s: energy, change", name), fabs(l.energy_residual) / (theta[1] * l.mass), 1e3 * EPSILON, "", "");
+    at_most(text("%s: energy, change", name), fabs(l.energy_residual) / (300 * l.mass), 1e3 * EPSILON, "", "");
     rig_end(&r);
 }
 /* Free thermoelastic motion that starts with a jump of 1 : 1000 about theta_R = 300 K. */
@@ -677,8 +705,10 @@ static void conduction_row(const char *name, double h, int stages, double most) 
 }
 static void heat(void) {
     const char *note;
-    heat_jump("heat between 1 : 1000, energy form", 1000, TLSPH_ENERGY, 0);
-    heat_jump("heat between 1 : 1000, own stages", 1000, TLSPH_ENERGY, 50);
+    heat_jump("heat between 1 : 1000", 1000, 1, 0);
+    heat_jump("heat between 1 : 1000, own stages", 1000, 1, 50);
+    heat_jump("heat between 1 : 1000, conductivity 1 : 1e3, c_v 1e3 : 1", 1000, 1e3, 0);
+    heat_jump("heat between 1 : 1000, conductivity 1 : 1e6, c_v 1e6 : 1", 1000, 1e6, 0);
     hot_and_cold("free body of 1 and 1000 K, energy", TLSPH_MIE_GRUNEISEN, TLSPH_ENERGY, 3e-4);
     hot_and_cold("free body of 1 and 1000 K, entropy", TLSPH_MIE_GRUNEISEN, TLSPH_ENTROPY, 3e-4);
     /* its stiffness is proportional to theta: a cold half has a 300th of it and could not bear what the hot one expands by */
@@ -709,11 +739,7 @@ static void jump_row(const char *name, double density, double young, tlsph_unkno
     r.materials[1].density = R(density);
     r.materials[1].young = R(young);
     rig_fill(&r);
-    uint8_t *materials = calloc(r.body.cloud.particles.count, 1);
-    if (!materials) abort();
-    for (size_t a = 0; a < r.body.cloud.particles.count; a++)
-        materials[a] = (double)r.body.cloud.particles.positions[3 * a] > 0.5;
-    r.body.cloud.particles.materials = materials;
+    uint8_t *materials = rig_two_materials(&r);
     rig_create(&r);
     r.body.cloud.particles.materials = NULL;
     rig_state(&r, NULL, moving_half);
