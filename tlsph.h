@@ -901,8 +901,10 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_LARGEST 1e300 /* stands for "no bound" in reductions */
 #ifdef TLSPH_REAL_FLOAT
 #define TLSPHI_EPSILON 1.1920929e-7
+#define TLSPHI_TINY 1.1754944e-38f /* under |C|^2, which is 0 in float where a neighbour is at the very edge of the support */
 #else
 #define TLSPHI_EPSILON 2.220446049250313e-16
+#define TLSPHI_TINY 2.2250738585072014e-308
 #endif
 
 #define TLSPHI_R(x) ((tlsph_real)(x)) /* a constant in the precision of the build */
@@ -4039,7 +4041,8 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t
                                          const int kind, tlsphi_gathered *sum, tlsph_real *production) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *w_a = s->wave + 4 * a, *w_b = s->wave + 4 * b, *v_a = s->w + D * a, *v_b = s->w + D * b;
-    const tlsph_real cc = tlsphi_dot(dim, c, c), CC = tlsphi_sqrt(tlsphi_dot(dim, C, C)), inverse = 1 / tlsphi_sqrt(cc);
+    const tlsph_real cc = tlsphi_max(tlsphi_dot(dim, c, c), TLSPHI_TINY), inverse = 1 / tlsphi_sqrt(cc);
+    const tlsph_real CC = tlsphi_sqrt(tlsphi_max(tlsphi_dot(dim, C, C), TLSPHI_TINY));
     const tlsph_real rho = (w_a[2] + w_b[2]) / 2, share = s->metal ? cc * inverse / (2 * CC) : TLSPHI_R(0.5);
     const tlsph_real c_p = (w_a[0] + w_b[0]) * share, c_s = (w_a[1] + w_b[1]) * share;
     tlsph_real n[3], d[3], Dv[3], Dr[3], D_p[3], D_J = 0, DS = 0;
@@ -4138,7 +4141,7 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, c
     tlsphi_multiply(dim, s->A + dd * a, g, c_a);
     tlsphi_multiply(dim, s->A + dd * b, g, c_b);
     const tlsph_real k = (s->h_J[a] * tlsphi_dot(dim, c_a, c_a) + s->h_J[b] * tlsphi_dot(dim, c_b, c_b)) * Cd /
-                         (2 * tlsphi_dot(dim, C, C) * tlsphi_dot(dim, d, d));
+                         (2 * tlsphi_max(tlsphi_dot(dim, C, C), TLSPHI_TINY) * tlsphi_dot(dim, d, d));
     const tlsph_real into = k * jump;
     sum->heat += thermal == TLSPH_ENERGY ? into : into / theta_a;
     sum->conduction += into * D_theta / (2 * theta_a * theta_b);
