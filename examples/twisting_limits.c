@@ -97,6 +97,8 @@ static void report(study *s, const twist_case *c) {
     RESULT("turns", s->shape.tip_twist / (2 * SCENE_PI), "1");
     RESULT("tip_height", s->shape.tip_height, "m");
     RESULT("minimum_J", s->least_J, "1");
+    /* of neighbours at the end: what the sum of energies does not show, a foot wound beyond what its particles resolve */
+    RESULT("pressure_oscillation", scene_oscillation(s->column.body.solver, TLSPH_FIELD_PRESSURE), "1");
     RESULT("steps", (double)s->base.now.step, "1");
     if (!s->given.options.quiet) fprintf(stderr, "%s, %s: %.0f s\n", c->name, name, ex_cpu_seconds() - s->began);
 #undef RESULT
