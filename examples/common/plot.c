@@ -192,6 +192,13 @@ static int line_meets(const ex_box *b, const double from[2], const double to[2])
     return first <= last;
 }
 
+/* Where the name of a note stands: to the lower left of its point, or to the right where that would leave the frame. */
+static ex_box note_box(const chart *c, const ex_curve *curve, const double at[2]) {
+    const double width = ex_label_width(0.8 * c->size, curve->name), gap = 4 * c->size;
+    const double left = at[0] - gap - width > c->frame.left ? at[0] - gap - width : at[0] + gap;
+    return (ex_box){ left, at[1] + 1 * c->size, left + width, at[1] + 10 * c->size };
+}
+
 /* Long curves are sampled; it is only about the place of the legend. */
 static int points_covered(const chart *c, const ex_box *b) {
     int hits = 0;
@@ -204,6 +211,10 @@ static int points_covered(const chart *c, const ex_box *b) {
             int ok = place_point(c, curve, j, at);
             if (ok && joined && curve->style != 2 && curve->style != EX_NOTE) hits += line_meets(b, last, at);
             else if (ok) hits += inside(b, at);
+            if (ok && curve->style == EX_NOTE && curve->name) {
+                const ex_box n = note_box(c, curve, at);
+                hits += n.left < b->right && n.right > b->left && n.top < b->bottom && n.bottom > b->top;
+            }
             if (ok) memcpy(last, at, sizeof last);
             joined = ok;
         }
@@ -379,6 +390,10 @@ static void put_text(const chart *c, double x, double y, int align, int upward, 
     ex_label(c->page, c->x0 + x, c->y0 + y, c->size, align, upward, text);
 }
 
+static void put_note(const chart *c, const ex_box *b, const char *text) {
+    ex_label(c->page, c->x0 + b->left, c->y0 + (b->top + b->bottom) / 2, 0.8 * c->size, EX_LEFT, 0, text);
+}
+
 static void draw_tick_texts(const chart *c) {
     const ex_box *f = &c->frame;
     double g = c->size;
@@ -413,15 +428,28 @@ static void draw_legend_texts(const chart *c) {
     }
 }
 
+/* Notes that would cover an earlier one move down. */
 static void draw_notes(const chart *c) {
+    enum { NOTES = 64 };
+    ex_box taken[NOTES];
+    int count = 0;
     for (int i = 0; i < c->count; i++) {
         const ex_curve *curve = &c->curves[i];
         double at[2];
         if (curve->style != EX_NOTE || !curve->name) continue;
-        for (size_t j = 0; j < curve->count; j++)
-            if (place_point(c, curve, j, at) && inside(&c->frame, at))
-                ex_label(c->page, c->x0 + at[0] - 4 * c->size, c->y0 + at[1] + 5 * c->size, 0.8 * c->size,
-                         at[0] - c->frame.left > ex_label_width(0.8 * c->size, curve->name) + 4 * c->size ? EX_RIGHT : EX_LEFT, 0, curve->name);
+        for (size_t j = 0; j < curve->count; j++) {
+            ex_box b;
+            if (!place_point(c, curve, j, at) || !inside(&c->frame, at)) continue;
+            b = note_box(c, curve, at);
+            for (int k = 0; k < count; k++) {
+                const double below = taken[k].bottom - b.top;
+                if (b.left >= taken[k].right || b.right <= taken[k].left || b.top >= taken[k].bottom || b.bottom <= taken[k].top) continue;
+                b.top += below; b.bottom += below;
+                k = -1;
+            }
+            if (count < NOTES) taken[count++] = b;
+            put_note(c, &b, curve->name);
+        }
     }
 }
 
