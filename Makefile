@@ -92,7 +92,7 @@ bench bench-full: $(BENCH_PROGRAMS)
 	build/textbook
 	build/scaling $(if $(filter bench,$@),--quick)
 	build/scaling_float --memory
-	sh bench/study.sh $(if $(filter bench,$@),240,3600 --full)
+	sh bench/study.sh $(if $(filter bench,$@),400,5400 --full)
 
 # Scenes and checkpoints of random bytes; tests/fuzz.c tells how libFuzzer and AFL++ run it.
 build/fuzz: tests/fuzz.c tlsph.h

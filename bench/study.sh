@@ -1,5 +1,5 @@
 #!/bin/sh
-# usage: bench/study.sh SECONDS [--full]: passes of the study in both precisions in turn, two at least and more while they
+# usage: bench/study.sh SECONDS [--full]: passes of the study in both precisions in turn, one at least and as many more as
 # fit into the time, then the report
 seconds=$1
 shift
@@ -9,8 +9,8 @@ rm -f out/bench/runs.csv
 while :; do
     build/study "$@" && build/study_float "$@" || exit 1
     passes=$((passes + 1))
-    now=$(date +%s)
-    [ $passes -ge 2 ] && [ $(((now - begin) * (passes + 1) / passes)) -gt "$seconds" ] && break
+    elapsed=$(($(date +%s) - begin))
+    [ $((elapsed * (passes + 1) / passes)) -gt "$seconds" ] && break
 done
-echo "study: $passes passes in $((now - begin)) s"
+echo "study: $passes passes in $elapsed s"
 exec build/study --report
