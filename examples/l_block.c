@@ -341,6 +341,7 @@ int main(int argc, char **argv) {
     int study_only = 0;
     const ex_option own[] = {
         { "spacing", EX_REAL, &p.spacing, "m", NULL, 0.05, 1.5, "distance of particles; 0.3 gives 5324 of them" },
+        { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45, "irregular cloud, closed operator; 0: lattice" },
         { "hot", EX_REAL, &p.hot, "K", NULL, 1, 1e4, "temperature of the face Y = 10 m at the start" },
         { "cold", EX_REAL, &p.cold, "K", NULL, 1, 1e4, "temperature of the face X = 6 m at the start" },
         { "study", EX_FLAG, &study_only, NULL, NULL, 0, 0, "four resolutions to 11 s instead of one run" } };

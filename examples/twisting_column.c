@@ -268,6 +268,7 @@ int main(int argc, char **argv) {
     const ex_option own[] = {
         { "n", EX_INT, &p.n, NULL, NULL, 2, 200, "spacings across the column's 1 m" },
         { "nu", EX_REAL, &p.nu, NULL, NULL, -0.9, 0.5, "Poisson's ratio; 0.5 itself needs --scheme incompressible" },
+        { "jitter", EX_REAL, &p.jitter, "spacings", NULL, 0, 0.45, "irregular cloud, closed operator; 0: lattice" },
         { "omega", EX_REAL, &p.omega, "rad/s", NULL, -1e4, 1e4, "initial angular velocity of the top" },
         { "study", EX_FLAG, &study, NULL, NULL, 0, 0, "three resolutions n, n + 2, n + 4 side by side" },
         { "iterations", EX_FLAG, &iterations, NULL, NULL, 0, 0, "of the incompressible scheme, against alpha" } };

@@ -65,6 +65,7 @@ static void initial_state(const void *scene, const tlsph_real X[3], scene_state 
 tlsph_result l_block_create(const l_block_parameters *p, l_block *out, tlsph_error *error) {
     const tlsph_material material = scene_paper_material(TLSPH_MIE_GRUNEISEN);
     tlsph_fill fill = tlsph_fill_default(3);
+    scene_options options = p->options;
     scene_setup setup;
     tlsph_result result;
     memset(out, 0, sizeof *out);
@@ -73,10 +74,12 @@ tlsph_result l_block_create(const l_block_parameters *p, l_block *out, tlsph_err
     fill.size[0] = (tlsph_real)width; fill.size[1] = (tlsph_real)height; fill.size[2] = (tlsph_real)arm;
     fill.notch[0] = fill.notch[1] = (tlsph_real)arm;
     fill.spacing = (tlsph_real)p->spacing;
+    fill.jitter = (tlsph_real)p->jitter;
+    if (p->jitter > 0) scene_options_cloud(&options, &fill);
     scene_begin(&setup, &fill, &material, error);
     add_force(&setup, out, 1, height, 1);
     add_force(&setup, out, 0, width, -1);
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, initial_state);
     if (result != TLSPH_OK) { scene_destroy(&out->body); return result; }
     out->probe = scene_nearest(&out->body.cloud.particles, 0, height, 0);

@@ -136,6 +136,7 @@ typedef struct l_block_parameters {
     double force[3];      /* N at f = 1: F1 on the face Y = 10 m, -F1 on X = 6 m */
     double ramp;          /* s; f rises for this time and falls for as long, then nothing acts */
     double hot, cold;     /* K, on Y = 10 m and on X = 6 m at t = 0 */
+    double jitter;        /* spacings: an irregular cloud and the closed operator */
 } l_block_parameters;
 
 typedef struct l_block {
@@ -318,6 +319,7 @@ typedef struct twisting_column_parameters {
     int centred;          /* 1: particles at the centres of cells, as n x n x 6n in 002; 0: on the faces */
     double nu;            /* Poisson's ratio */
     double omega;         /* rad/s, of the initial angular velocity at the top */
+    double jitter;        /* spacings: an irregular cloud and the closed operator */
 } twisting_column_parameters;
 
 typedef struct twisting_column {

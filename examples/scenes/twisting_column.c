@@ -32,6 +32,7 @@ static void initial_state(const void *scene, const tlsph_real X[3], scene_state 
 tlsph_result twisting_column_create(const twisting_column_parameters *p, twisting_column *out, tlsph_error *error) {
     tlsph_material material = tlsph_material_default(TLSPH_NEO_HOOKEAN);
     tlsph_fill fill = tlsph_fill_default(3);
+    scene_options options = p->options;
     scene_setup setup;
     tlsph_result result;
     memset(out, 0, sizeof *out);
@@ -45,9 +46,11 @@ tlsph_result twisting_column_create(const twisting_column_parameters *p, twistin
     fill.origin[0] = fill.origin[2] = (tlsph_real)-0.5;
     fill.spacing = (tlsph_real)(1.0 / p->n);
     fill.placement = p->centred ? TLSPH_CELL_CENTRED : TLSPH_ON_FACES;
+    fill.jitter = (tlsph_real)p->jitter;
+    if (p->jitter > 0) scene_options_cloud(&options, &fill);
     scene_begin(&setup, &fill, &material, error);
     scene_add_plane(&setup, TLSPH_CLAMPED, 1, p->centred ? 0.5 / p->n : 0);
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, initial_state);
     if (result != TLSPH_OK) scene_destroy(&out->body);
     return result;
