@@ -75,7 +75,10 @@ tlsph_result l_block_create(const l_block_parameters *p, l_block *out, tlsph_err
     fill.notch[0] = fill.notch[1] = (tlsph_real)arm;
     fill.spacing = (tlsph_real)p->spacing;
     fill.jitter = (tlsph_real)p->jitter;
-    if (p->jitter > 0) scene_options_cloud(&options, &fill);
+    if (p->jitter > 0) {
+        if (options.operator_kind == TLSPH_CELLS) options.operator_kind = TLSPH_CORRECTED_KERNEL; /* the scene's default */
+        scene_options_cloud(&options, &fill);
+    }
     scene_begin(&setup, &fill, &material, error);
     add_force(&setup, out, 1, height, 1);
     add_force(&setup, out, 0, width, -1);
