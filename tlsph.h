@@ -881,6 +881,14 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #else
 #define TLSPHI_UNROLL
 #endif
+/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. */
+#if defined(__clang__)
+#define TLSPHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#elif defined(__GNUC__) && __GNUC__ >= 8
+#define TLSPHI_EACH_LANE _Pragma("GCC ivdep")
+#else
+#define TLSPHI_EACH_LANE
+#endif
 
 #ifdef TLSPH_REAL_FLOAT
 #define tlsphi_sqrt sqrtf
@@ -901,7 +909,7 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_LARGEST 1e300 /* stands for "no bound" in reductions */
 #ifdef TLSPH_REAL_FLOAT
 #define TLSPHI_EPSILON 1.1920929e-7
-#define TLSPHI_TINY 1.1754944e-38f /* under |C|^2, which is 0 in float where a neighbour is at the very edge of the support */
+#define TLSPHI_TINY 1.17549435e-38f /* smallest normal number: added to divisors that may be 0 where the dividend is */
 #else
 #define TLSPHI_EPSILON 2.220446049250313e-16
 #define TLSPHI_TINY 2.2250738585072014e-308
@@ -937,14 +945,32 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
     memcpy(&bits, &x, sizeof bits);
     bits = 0x54a21d2au - bits / 3;
 #else
-    uint64_t bits;
+    uint64_t bits; /* a third of the upper half, as a product, because vector units do not divide integers */
     memcpy(&bits, &x, sizeof bits);
-    bits = 0x553ef0ff289dd796u - bits / 3;
+    bits = (0x553ef0ffu - ((bits >> 32) * 0x55555556u >> 32)) << 32;
 #endif
     memcpy(&y, &bits, sizeof y);
     for (int i = 0; i < 5; i++) y *= (4 - x * y * y * y) * TLSPHI_R(1.0 / 3.0);
     return y;
 }
+/* x^(-1/2) and x^(1/2) in the same manner, for loops over lanes: sqrt must set errno, which no compiler can do for eight
+   numbers at once. A huge number for x = 0. */
+TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real x) {
+    tlsph_real y;
+#ifdef TLSPH_REAL_FLOAT
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = 0x5f375a86u - (bits >> 1);
+#else
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = 0x5fe6eb50c7b537a9u - (bits >> 1);
+#endif
+    memcpy(&y, &bits, sizeof y);
+    TLSPHI_UNROLL for (int i = 0; i < 4; i++) y *= TLSPHI_R(1.5) - TLSPHI_R(0.5) * x * y * y;
+    return y;
+}
+TLSPHI_INLINE tlsph_real tlsphi_square_root(tlsph_real x) { return x * tlsphi_inverse_root(x); }
 TLSPHI_INLINE int tlsphi_nan(tlsph_real x) { /* not finite, and not equal to infinity's bits */
     const tlsph_real infinity = (tlsph_real)HUGE_VAL, minus = -infinity;
     return !tlsphi_finite(x) && memcmp(&x, &infinity, sizeof x) != 0 && memcmp(&x, &minus, sizeof x) != 0;
@@ -1137,7 +1163,7 @@ TLSPHI_DEF tlsph_real tlsph_determinant(const tlsph_real *F) {
     return F[0] * (F[4] * F[8] - F[5] * F[7]) + F[1] * (F[5] * F[6] - F[3] * F[8]) + F[2] * (F[3] * F[7] - F[4] * F[6]);
 }
 /* Rows of cof F are cross products of the rows of F. */
-TLSPHI_DEF void tlsph_cofactor(const tlsph_real *F, tlsph_real *H) {
+TLSPHI_INLINE void tlsphi_cofactor_inline(const tlsph_real *F, tlsph_real *H) {
     H[0] = F[4] * F[8] - F[5] * F[7];
     H[1] = F[5] * F[6] - F[3] * F[8];
     H[2] = F[3] * F[7] - F[4] * F[6];
@@ -1148,16 +1174,18 @@ TLSPHI_DEF void tlsph_cofactor(const tlsph_real *F, tlsph_real *H) {
     H[7] = F[2] * F[3] - F[0] * F[5];
     H[8] = F[0] * F[4] - F[1] * F[3];
 }
+TLSPHI_DEF void tlsph_cofactor(const tlsph_real *F, tlsph_real *H) { tlsphi_cofactor_inline(F, H); }
 /* (A x B)_iI = e_ijk e_IJK A_jJ B_kK: the polar form of the cofactor, cof(A + B) = cof A + A x B + cof B. */
-TLSPHI_DEF void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
-    for (int i = 0; i < 3; i++) {
+TLSPHI_INLINE void tlsphi_cross_inline(const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
+    TLSPHI_UNROLL for (int i = 0; i < 3; i++) {
         const int j = 3 * ((i + 1) % 3), k = 3 * ((i + 2) % 3);
-        for (int I = 0; I < 3; I++) {
+        TLSPHI_UNROLL for (int I = 0; I < 3; I++) {
             const int J = (I + 1) % 3, K = (I + 2) % 3;
             C[3 * i + I] = A[j + J] * B[k + K] - A[j + K] * B[k + J] + A[k + K] * B[j + J] - A[k + J] * B[j + K];
         }
     }
 }
+TLSPHI_DEF void tlsph_cross(const tlsph_real *A, const tlsph_real *B, tlsph_real *C) { tlsphi_cross_inline(A, B, C); }
 
 /* Eigenvalues and vectors (columns of Q) of a symmetric 3x3 by cyclic Jacobi rotations. A is destroyed: its diagonal
    becomes the eigenvalues, unordered. Equal eigenvalues do no harm: no difference of them is ever divided by. */
@@ -1224,7 +1252,7 @@ static void tlsphi_stretches(const tlsph_real *F, double out[3]) {
    exact when the two smaller ones are equal, and much cheaper than the eigenvalue. */
 TLSPHI_INLINE tlsph_real tlsphi_largest_bound(tlsph_real trace, tlsph_real trace_of_square) {
     const tlsph_real spread = trace_of_square - trace * trace / 3;
-    return trace / 3 + tlsphi_sqrt(TLSPHI_R(2.0 / 3.0) * tlsphi_max(spread, 0));
+    return trace / 3 + tlsphi_square_root(TLSPHI_R(2.0 / 3.0) * tlsphi_max(spread, 0));
 }
 static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 static double tlsphi_norm2(const double a[3]) { return tlsphi_dot3(a, a); }
@@ -1342,6 +1370,31 @@ static void tlsphi_grid_hash(tlsphi_grid *grid) {
    of pairs, and whether C is antisymmetric by itself. Each builder answers one question: which neighbours has host
    particle a, and what is g_ab for each? */
 
+#define TLSPHI_BLOCK 128 /* particles a task: small enough for load balance, large enough to hide the call */
+
+/* Lanes. The hot loops take this many neighbouring particles at once: the physics of one pair or particle is written for
+   one, as an inline function, and stands in a loop over the lanes, which a compiler turns into vector instructions.
+   What neighbours read lies in rows, one a component of a block of particles, so that the lanes of a component lie side by
+   side. On a lattice the particles of a tile mostly have their k-th neighbours side by side, too (see [TILES]); others are
+   gathered into spare columns at the end of the rows of their own block. */
+#define TLSPHI_LANES (sizeof(tlsph_real) == 8 ? 8 : 16)
+#define TLSPHI_LANES_MOST 16
+#define TLSPHI_ROW (TLSPHI_BLOCK + TLSPHI_LANES)
+
+/* Pairs by tiles of TLSPHI_LANES particles: a slot is one neighbour for each lane. */
+typedef struct tlsphi_slot {
+    uint32_t pattern; /* which of the tile patterns: C_ab (D lanes each) and |C_ab|, 0 where a lane has no pair */
+    uint32_t from;    /* first of the neighbours side by side, or where the lanes' neighbours begin in `gathered` */
+    uint32_t scattered;
+} tlsphi_slot;
+typedef struct tlsphi_graph {
+    size_t tiles, slots, patterns, gathers;
+    size_t *first; /* slot of each tile; tiles in the order of the blocks */
+    tlsphi_slot *slot;
+    uint32_t *gathered;
+    tlsph_real *pattern; /* (D + 1) x lanes each */
+} tlsphi_graph;
+
 typedef struct tlsphi_scratch {
     void *memory;
     size_t size;
@@ -1371,10 +1424,11 @@ typedef struct tlsphi_plan {
     uint32_t *host, *inner; /* solver order -> host number, and back */
     uint32_t *body;         /* of each particle in solver order */
     size_t bodies, blocks;
+    tlsphi_graph graph[2];   /* of all pairs; of those of the dissipation, where they are others. See [TILES] */
     uint8_t *fixed;          /* number of constrained directions of each particle (solver order), */
     double *fixed_direction; /* and these directions, orthonormal, dim x dim each */
     size_t fixes, mirrors;   /* how many in all (see [CONDITIONS]) */
-    tlsphi_scratch scratch[48];
+    tlsphi_scratch scratch[64];
     int scratches;
 } tlsphi_plan;
 
@@ -1400,6 +1454,24 @@ static void *tlsphi_scratch_grow(tlsphi_plan *plan, void *old, size_t from, size
     plan->allocator.release(plan->allocator.user, old, plan->scratch[i].size);
     plan->scratch[i] = plan->scratch[--plan->scratches];
     return memory;
+}
+
+/* Makes an array of scratch hold `need` elements at least; what it holds moves with it. 0 if there is no memory. */
+static int tlsphi_scratch_grow(tlsphi_plan *plan, void **array, size_t *capacity, size_t need, size_t size) {
+    if (need <= *capacity) return 1;
+    const size_t more = 2 * need + 64;
+    void *memory = tlsphi_scratch_take(plan, more, size);
+    if (!memory) return 0;
+    for (int i = 0; i < plan->scratches && *array; i++) {
+        tlsphi_scratch *old = plan->scratch + i;
+        if (old->memory != *array) continue;
+        memcpy(memory, old->memory, *capacity * size);
+        plan->allocator.release(plan->allocator.user, old->memory, old->size);
+        *old = plan->scratch[--plan->scratches];
+    }
+    *array = memory;
+    *capacity = more;
+    return 1;
 }
 
 static void tlsphi_plan_release(tlsphi_plan *plan) {
@@ -1782,14 +1854,23 @@ static tlsph_result tlsphi_fourth_build(tlsphi_plan *plan) {
     return TLSPH_OK;
 }
 
+/* Kernels' vectors that differ by the round-off of positions become the same, so that few patterns serve for a lattice (see
+   [TILES]). Rounding is odd: C_ab = -C_ba stays exact, and M_a is made from what is rounded. */
+static void tlsphi_round_vectors(const tlsphi_plan *plan, double *g, size_t reals) {
+    const double quantum = pow(plan->h, plan->dim - 1) * (TLSPHI_EPSILON > 1e-10 ? 1e-6 : 1e-14);
+    for (size_t i = 0; i < reals; i++) g[i] = (g[i] < 0 ? -1 : 1) * floor(fabs(g[i]) / quantum + 0.5) * quantum;
+}
 static size_t tlsphi_neighbours_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
     switch (plan->desc->operator_kind) {
     case TLSPH_CLOSED: return tlsphi_closed_neighbours(plan, a, list, g);
     case TLSPH_CELLS: return tlsphi_cell_neighbours(plan, a, list, g);
     case TLSPH_CELLS_4: return tlsphi_fourth_neighbours(plan, a, list, g);
     case TLSPH_GIVEN: return tlsphi_given_neighbours(plan, a, list, g);
-    default: return tlsphi_kernel_neighbours(plan, a, list, g);
+    default: break;
     }
+    const size_t count = tlsphi_kernel_neighbours(plan, a, list, g);
+    if (g && !plan->bond) tlsphi_round_vectors(plan, g, count * (size_t)plan->dim);
+    return count;
 }
 static double tlsphi_plan_volume(const tlsphi_plan *plan, size_t a) {
     return plan->volume ? plan->volume[a] : (double)plan->desc->particles.volumes[a];
@@ -2132,6 +2213,7 @@ static void tlsphi_pair_vectors(const tlsphi_plan *plan, size_t a, size_t b, con
         }
     }
     for (int i = 0; i < 3; i++) middle[i] = (mine[i] + other[i]) / 2;
+    if (plan->correction && plan->antisymmetric) tlsphi_round_vectors(plan, middle, 3);
 }
 
 /* -- bodies and order -- */
@@ -2210,16 +2292,79 @@ static void tlsphi_test_antisymmetry(tlsphi_plan *plan, uint32_t *list, double *
     plan->antisymmetric = worst <= (TLSPHI_EPSILON > 1e-10 ? 1e-5 : 1e-11) * largest;
 }
 
-/* Bodies get numbers in the order of their first particle; particles are ordered by body, then along the Morton curve
-   (kernels) or in the host's order. */
-static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
+/* Spacing of the lattice along each axis, seen from the first particle: the least distance along the axis of which all its
+   neighbours' are multiples. Clouds have none; there it is the edge of the particle's volume. */
+static void tlsphi_row_spacing(const tlsphi_plan *plan, const uint32_t *list, size_t count, double spacing[3]) {
+    const double edge = pow(tlsphi_plan_volume(plan, 0), 1.0 / plan->dim);
+    for (int axis = 0; axis < plan->dim; axis++) {
+        double d[3], least = TLSPHI_LARGEST;
+        int regular = 1;
+        for (int pass = 0; pass < 2; pass++)
+            for (size_t i = 0; i < count; i++) {
+                tlsphi_difference(plan, 0, list[i], d);
+                const double along = fabs(d[axis]);
+                if (!pass && along > 1e-3 * edge) least = tlsphi_dmin(least, along);
+                if (pass && fabs(along / least - floor(along / least + 0.5)) > 1e-3) regular = 0;
+            }
+        spacing[axis] = regular && least > 0.3 * edge && least < 10 * edge ? least : edge;
+    }
+}
+/* Sort keys: rows along the longest axis, in strips of about TLSPHI_STRIP particles a layer, so that the layers above and
+   below are still in the cache when they are needed again. */
+#define TLSPHI_STRIP 1024
+static void tlsphi_row_keys(const tlsphi_plan *plan, const double spacing[3], uint64_t *key) {
+    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+    uint64_t cells[3] = {1, 1, 1};
+    int axis[3] = {0, 1, 2};
+    for (int i = 0; i < plan->dim; i++) {
+        low[i] = high[i] = (double)tlsphi_position(plan, 0)[i];
+        for (size_t a = 1; a < plan->n; a++) {
+            low[i] = tlsphi_dmin(low[i], (double)tlsphi_position(plan, a)[i]);
+            high[i] = tlsphi_dmax(high[i], (double)tlsphi_position(plan, a)[i]);
+        }
+        cells[i] = (uint64_t)tlsphi_dmin((high[i] - low[i]) / spacing[i] + 1.5, 2e6);
+    }
+    for (int i = 1; i < 3; i++)
+        if (cells[i] > cells[axis[0]]) {
+            axis[i] = axis[0];
+            axis[0] = i;
+        }
+    const int x = axis[0], y = axis[1], z = axis[2];
+    const uint64_t strip = cells[x] < TLSPHI_STRIP ? TLSPHI_STRIP / cells[x] : 1;
+    for (size_t a = 0; a < plan->n; a++) {
+        uint64_t at[3] = {0, 0, 0};
+        for (int i = 0; i < plan->dim; i++) {
+            at[i] = (uint64_t)(((double)tlsphi_position(plan, a)[i] - low[i]) / spacing[i] + 0.5);
+            if (at[i] >= cells[i]) at[i] = cells[i] - 1;
+        }
+        key[a] = (((at[y] / strip) * cells[z] + at[z]) * strip + at[y] % strip) * cells[x] + at[x];
+    }
+}
+/* Particles by rows of the lattice, or of a lattice laid over a cloud: see [TILES]. list and g hold the largest
+   neighbourhood. */
+static uint32_t *tlsphi_order_rows(tlsphi_plan *plan, uint32_t *list, double *g) {
+    const size_t n = plan->n;
+    uint64_t *key = TLSPHI_SCRATCH(plan, uint64_t, n), *key2 = TLSPHI_SCRATCH(plan, uint64_t, n);
+    uint32_t *order = TLSPHI_SCRATCH(plan, uint32_t, n), *order2 = TLSPHI_SCRATCH(plan, uint32_t, n);
+    double spacing[3] = {1, 1, 1};
+    if (!key || !key2 || !order || !order2) return NULL;
+    tlsphi_row_spacing(plan, list, tlsphi_neighbours_of(plan, 0, list, g), spacing);
+    tlsphi_row_keys(plan, spacing, key);
+    for (size_t i = 0; i < n; i++) order[i] = (uint32_t)i;
+    tlsphi_radix_sort(key, order, key2, order2, n);
+    return order;
+}
+/* Bodies get numbers in the order of their first particle; particles are ordered by body, then by rows. */
+static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent, uint32_t *list, double *g) {
     const size_t n = plan->n;
     size_t *start = TLSPHI_SCRATCH(plan, size_t, n + 2);
     uint32_t *label = TLSPHI_SCRATCH(plan, uint32_t, n);
     plan->host = TLSPHI_SCRATCH(plan, uint32_t, n);
     plan->inner = TLSPHI_SCRATCH(plan, uint32_t, n);
     plan->body = TLSPHI_SCRATCH(plan, uint32_t, n);
-    if (!start || !label || !plan->host || !plan->inner || !plan->body) return tlsphi_no_memory(plan, 20.0 * (double)n);
+    const uint32_t *order = tlsphi_order_rows(plan, list, g);
+    if (!start || !label || !plan->host || !plan->inner || !plan->body || !order)
+        return tlsphi_no_memory(plan, 48.0 * (double)n);
     for (size_t a = 0; a < n; a++) { /* roots are the smallest numbers of their bodies, so they come first */
         const uint32_t root = tlsphi_root(parent, (uint32_t)a);
         label[a] = root == a ? (uint32_t)plan->bodies++ : label[root];
@@ -2227,7 +2372,7 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent) {
     }
     for (size_t b = 0; b < plan->bodies; b++) start[b + 2] += start[b + 1];
     for (size_t i = 0; i < n; i++) {
-        const uint32_t a = plan->grid.order ? plan->grid.order[i] : (uint32_t)i;
+        const uint32_t a = order[i];
         const size_t at = start[label[a] + 1]++;
         plan->host[at] = a;
         plan->inner[a] = (uint32_t)at;
@@ -2288,25 +2433,25 @@ typedef struct tlsphi_closer {
 
 /* The loop over components; left rolled it becomes one vector operation. */
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 8
-#define TLSPHI_LANES _Pragma("GCC unroll 1") for (int j = 0; j < 4; j++)
+#define TLSPHI_FOUR _Pragma("GCC unroll 1") for (int j = 0; j < 4; j++)
 #else
-#define TLSPHI_LANES for (int j = 0; j < 4; j++)
+#define TLSPHI_FOUR for (int j = 0; j < 4; j++)
 #endif
 
 /* q = K p for one particle; the sum of q.p. */
 TLSPHI_INLINE double tlsphi_closure_row(const tlsphi_closer *c, size_t a, const int rows) {
     const double *slack = c->slack[a], *from = c->p + 4 * (size_t)rows * a;
     double pa[16], y[16] = {0}, *q = c->q + 4 * (size_t)rows * a, sum = 0;
-    TLSPHI_UNROLL for (int l = 0; l < rows; l++) TLSPHI_LANES pa[4 * l + j] = from[4 * l + j];
+    TLSPHI_UNROLL for (int l = 0; l < rows; l++) TLSPHI_FOUR pa[4 * l + j] = from[4 * l + j];
     for (size_t k = c->first[a]; k < c->first[a + 1]; k++) {
         const double *pb = c->p + 4 * (size_t)rows * c->list[k], w = (double)c->pair[k][0];
         const double d[4] = {0, (double)c->pair[k][1], (double)c->pair[k][2], (double)c->pair[k][3]};
         double X[4];
-        TLSPHI_LANES X[j] = pa[j] - pb[j];
-        TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_LANES X[j] += (pa[4 * l + j] + pb[4 * l + j]) * d[l];
-        TLSPHI_LANES X[j] *= w;
-        TLSPHI_LANES y[j] += X[j];
-        TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_LANES y[4 * l + j] += X[j] * d[l];
+        TLSPHI_FOUR X[j] = pa[j] - pb[j];
+        TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_FOUR X[j] += (pa[4 * l + j] + pb[4 * l + j]) * d[l];
+        TLSPHI_FOUR X[j] *= w;
+        TLSPHI_FOUR y[j] += X[j];
+        TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_FOUR y[4 * l + j] += X[j] * d[l];
     }
     const double along = tlsphi_dot3(slack, pa);
     for (int j = 0; j < 3; j++) y[j] += slack[j] * along + slack[6] * pa[j];
@@ -2660,7 +2805,7 @@ static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, ui
 /* A material's constants as the loops want them. */
 typedef struct tlsphi_material {
     tlsph_material_kind kind;
-    int entropic;                       /* MEE: psi and u sit in the entropy */
+    int entropic, mooney;               /* MEE: psi and u sit in the entropy; gamma is not 0 */
     tlsph_real rho, c_v, theta_R, h;    /* kg/m^3, J/(m^3 K), K, W/(m K) */
     tlsph_real zeta, gamma, k, beta, q; /* Pa, Pa, Pa, Pa/K, 1 */
     tlsph_real mu, kappa;               /* Pa; kappa = k = 0 in the incompressible scheme, which has instead: */
@@ -2685,6 +2830,7 @@ static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
     out.q = m->kind == TLSPH_MIE_GRUNEISEN ? m->gruneisen_exponent : 1;
     out.beta = m->kind == TLSPH_NEO_HOOKEAN || m->kind == TLSPH_USER ? 0 : 3 * out.kappa * m->expansion;
     out.gamma = m->mooney_fraction * out.mu / TLSPHI_R(5.196152422706632); /* 3 sqrt 3 */
+    out.mooney = out.gamma != 0;
     out.zeta = (1 - m->mooney_fraction) * out.mu / 2;
     out.k = out.kappa - out.beta * out.theta_R * (1 - out.q);
     out.c_linear = tlsphi_sqrt((out.kappa + 4 * out.mu / 3) / out.rho);
@@ -2708,8 +2854,8 @@ TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_
     out.a = 2 * m->zeta * J23;
     out.b = 0;
     out.c = -out.a * I1 / (3 * J);
-    if (m->gamma != 0) {
-        const tlsph_real root2 = tlsphi_sqrt(I2), J2 = 1 / (J * J);
+    if (m->mooney) {
+        const tlsph_real root2 = tlsphi_square_root(I2), J2 = 1 / (J * J);
         out.psi += m->gamma * (J2 * I2 * root2 - TLSPHI_R(5.196152422706632));
         out.b = 3 * m->gamma * J2 * root2;
         out.c -= 2 * m->gamma * J2 * I2 * root2 / J;
@@ -2740,12 +2886,12 @@ TLSPHI_INLINE tlsphi_invariants tlsphi_principal_bounds(tlsph_real I1, tlsph_rea
     s.l3 = J * J / s.LH;
     return s;
 }
-static tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev,
+TLSPHI_INLINE tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev,
                                         const tlsphi_invariants *s) {
-    const tlsph_real ratio = tlsphi_sqrt(s->L1 * s->LH) / s->J; /* largest over least stretch */
+    const tlsph_real ratio = tlsphi_square_root(s->L1 * s->LH) / s->J; /* largest over least stretch */
     tlsph_real along = dev->a * (5 * s->I1 * s->LH / (9 * s->J * s->J) - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
     tlsph_real across = dev->a, mixed = dev->a * (ratio - 1 / ratio) / 3;
-    if (m->gamma != 0) {
+    if (m->mooney) {
         const tlsph_real factor = dev->b / (s->J * s->J * s->I2); /* 3 gamma J^-4 / sqrt I2 */
         const tlsph_real least = s->J * s->J / s->L1;             /* of H^T H */
         const tlsph_real half = (s->LH - least) / 2, sum = s->I2 + s->LH;
@@ -2754,11 +2900,11 @@ static tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_d
         across += dev->b * s->L1 + factor * half * half * s->LH;
         mixed += dev->b * (s->L1 - s->l3) / 2 + factor * s->LH * sum * half;
     }
-    return (along + across + tlsphi_sqrt((along - across) * (along - across) + 4 * mixed * mixed)) / 2;
+    return (along + across + tlsphi_square_root((along - across) * (along - across) + 4 * mixed * mixed)) / 2;
 }
 /* MEE: bound of |d eta_R/dF N|^2, by which coupling stiffens the isentropic wave. With the vectors above,
    d eta_R/dF N = (beta theta_R h - P_psi N)/theta_R = c_h h + c_f f + c_r r. */
-static tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsphi_deviator *dev,
+TLSPHI_INLINE tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsphi_deviator *dev,
                                            const tlsphi_invariants *s) {
     const tlsph_real mooney = dev->b * s->I2 / s->J; /* 3 gamma J^-3 I2^3/2 */
     const tlsph_real volumetric = m->k * (s->J - 1) - dev->a * s->I1 / (3 * s->J) + mooney / 3;
@@ -2769,7 +2915,7 @@ static tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsph
         const tlsph_real c = c_h + c_r * (end ? s->LH : least);
         largest = tlsphi_max(largest, c * c * s->LH + 2 * c * c_f * s->J + c_f * c_f * s->L1);
     }
-    const tlsph_real norm = tlsphi_sqrt(largest) + c_r * tlsphi_sqrt(s->LH) * (s->LH - least) / 2;
+    const tlsph_real norm = tlsphi_square_root(largest) + c_r * tlsphi_square_root(s->LH) * (s->LH - least) / 2;
     return norm * norm;
 }
 
@@ -2778,7 +2924,7 @@ static int tlsphi_has_invariants(tlsph_material_kind kind) {
     return kind != TLSPH_LINEAR && kind != TLSPH_VON_MISES && kind != TLSPH_USER;
 }
 /* Bounds rho c^2 = [0] + theta [1]. J here is det F; with `coupled` = 0 the isothermal p speed. */
-static void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s, int coupled,
+TLSPHI_INLINE void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s, int coupled,
                           tlsph_response *out) {
     const tlsph_real elastic = tlsphi_acoustic_bound(m, dev, s);
     const tlsph_real shear = dev->a + dev->b * s->I1 / 3;
@@ -2824,17 +2970,14 @@ static void tlsphi_respond_linear(const tlsphi_material *m, const tlsph_real *F,
 
 /* The built-in laws at F with deviatoric arguments (H, Jd) and volumetric argument J. e_F holds the whole deviatoric
    part a F + b H x F + c H (for MEE it is -theta_R eta_F). `dev` returns a, b, c for conjugates. */
-static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H, tlsph_real Jd,
-                           tlsph_real J, int coupled, tlsph_response *out, tlsphi_deviator *dev) {
-    if (m->kind == TLSPH_LINEAR) {
-        tlsphi_respond_linear(m, F, J, coupled, out, dev);
-        return;
-    }
+TLSPHI_INLINE void tlsphi_respond_inline(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H,
+                                         tlsph_real Jd, tlsph_real J, int coupled, tlsph_response *out,
+                                         tlsphi_deviator *dev) {
     const tlsph_real I1 = tlsphi_dot(9, F, F), I2 = tlsphi_dot(9, H, H);
     tlsph_real S[9];
     *dev = tlsphi_deviatoric(m, I1, I2, Jd);
     for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
-    if (m->gamma != 0) {
+    if (m->mooney) {
         tlsph_real HxF[9];
         tlsph_cross(H, F, HxF);
         for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
@@ -2862,6 +3005,11 @@ static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const 
     }
     const tlsphi_invariants spread = tlsphi_principal_bounds(I1, I2, Jd);
     tlsphi_moduli(m, dev, &spread, coupled, out);
+}
+static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H, tlsph_real Jd,
+                           tlsph_real J, int coupled, tlsph_response *out, tlsphi_deviator *dev) {
+    if (m->kind == TLSPH_LINEAR) tlsphi_respond_linear(m, F, J, coupled, out, dev);
+    else tlsphi_respond_inline(m, F, H, Jd, J, coupled, out, dev);
 }
 
 /* W(phi)/(b0 mu), W' and W'' of the drift potential. */
@@ -3107,8 +3255,42 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
    the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
    so their value does not depend on the threads. */
 
-#define TLSPHI_BLOCK 128 /* particles a task: small enough for load balance, large enough to hide the call */
-#define TLSPHI_CHUNK 32  /* particles a call of a user's material */
+
+/* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
+   P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, drift
+   ratio); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and grad w beside the sharpened. */
+typedef struct tlsphi_rows {
+    int v, w, X, P, A, slope_w, wave; /* D, D, D, DD, DD, DD, 4 */
+    int S, slope_S;                   /* 1, D: Sigma_J; with J */
+    int theta;                        /* 1; thermal */
+    int slope_theta, heat, h_J;       /* D, D, 1; with conduction */
+    int PM, grad_w;                   /* DD, DD */
+    int lap_p;                        /* D; JST */
+    int count;
+} tlsphi_rows;
+
+TLSPHI_INLINE tlsphi_rows tlsphi_rows_of(const int dim, const int has_J, int thermal, int conducts, int sharp) {
+    tlsphi_rows r;
+    const int dd = dim * dim;
+    r.v = 0;
+    r.w = dim;
+    r.X = 2 * dim;
+    r.P = 3 * dim;
+    r.A = r.P + dd;
+    r.slope_w = r.A + dd;
+    r.wave = r.slope_w + dd;
+    r.S = r.wave + 4;
+    r.slope_S = r.S + 1;
+    r.theta = r.S + (has_J ? 1 + dim : 0);
+    r.slope_theta = r.theta + (thermal ? 1 : 0);
+    r.heat = r.slope_theta + (conducts ? dim : 0);
+    r.h_J = r.heat + (conducts ? dim : 0);
+    r.count = r.h_J + (conducts ? 1 : 0);
+    r.PM = sharp ? r.count : r.P;
+    r.grad_w = sharp ? r.count + dd : r.slope_w;
+    r.count += sharp ? 2 * dd : 0;
+    return r;
+}
 
 typedef struct tlsphi_state {
     tlsph_real *x, *p, *F; /* D, D, DD */
@@ -3128,6 +3310,7 @@ enum { TLSPHI_MOMENTS = 16 }; /* sums of the projection, see [PROJECTION] */
 
 typedef struct tlsphi_block {
     uint32_t begin, end, body;
+    uint32_t tile; /* its first, in a graph */
     uint32_t failed; /* first bad particle of the block, or TLSPHI_NONE */
     tlsph_result failure;
     double time_step, heat_step; /* stable step of its particles, s; of conduction alone, where that is split off */
@@ -3237,13 +3420,13 @@ struct tlsph_solver {
     size_t state_reals;
     /* rates per reference volume */
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
-    /* what neighbours read: velocity, P M, A = H M, (c_p, c_s, rho, drift ratio), Sigma_J and its gradient,
-       temperature and its gradient, M^T Q/theta, h/J; w is v without the body's rigid motion, as the dissipation sees it
-       (without projection w and grad_w are v and grad_v). Without sharp gradients rate_F, slope_w and P_flux are grad_v,
-       grad_w and PM */
-    tlsph_real *least_stretch;            /* [PAIR-STEP] */
-    tlsph_real *laplacian, *lean, *lap_p; /* [JST]: l_ab a pair, 2 vectors and Lp_a a particle */
-    tlsph_real *w, *grad_w, *slope_w, *v, *grad_v, *P_flux, *PM, *A, *wave, *S, *grad_S, *theta, *grad_theta, *heat, *h_J;
+    tlsphi_rows rows;
+    tlsph_real *row;         /* blocks of rows, see above */
+    tlsph_real *v, *grad_v;  /* velocity; grad v, which is rate_F but for sharp gradients */
+    int lanes;               /* fluxes by lanes: default dissipation, no audit */
+    tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
+    tlsph_real *least_stretch;        /* [PAIR-STEP] */
+    tlsph_real *laplacian, *lean;     /* [JST]: l_ab a pair, 2 vectors a particle */
     tlsph_real *held; /* frozen dissipation: T, D_J and the share of heat of each particle, D + 2; else NULL */
     /* conditions */
     tlsphi_fix *fix;
@@ -3274,6 +3457,28 @@ TLSPHI_INLINE const tlsphi_material *tlsphi_material_of(const tlsph_solver *s, s
     return s->materials + (s->material_of ? s->material_of[a] : 0);
 }
 
+/* The first component of particle a in a row; the others follow TLSPHI_ROW apart. */
+TLSPHI_INLINE tlsph_real *tlsphi_at(const tlsph_solver *s, int row, size_t a) {
+    return s->row + (a / TLSPHI_BLOCK * (size_t)s->rows.count + (size_t)row) * TLSPHI_ROW + a % TLSPHI_BLOCK;
+}
+TLSPHI_INLINE void tlsphi_take_rows(const int n, const tlsph_real *at, tlsph_real *out) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) out[i] = at[(size_t)i * TLSPHI_ROW];
+}
+TLSPHI_INLINE void tlsphi_row_get(const tlsph_solver *s, int row, const int n, size_t a, tlsph_real *out) {
+    tlsphi_take_rows(n, tlsphi_at(s, row, a), out);
+}
+TLSPHI_INLINE void tlsphi_row_put(const tlsph_solver *s, int row, const int n, size_t a, const tlsph_real *in) {
+    tlsph_real *at = tlsphi_at(s, row, a);
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) at[(size_t)i * TLSPHI_ROW] = in[i];
+}
+
+/* End of the tile that begins with particle a. */
+TLSPHI_INLINE size_t tlsphi_tile_end(const tlsphi_block *block, size_t a) {
+    const size_t end = (a / TLSPHI_LANES + 1) * TLSPHI_LANES;
+    return end < block->end ? end : block->end;
+}
+TLSPHI_INLINE tlsph_real *tlsphi_theta(const tlsph_solver *s, size_t a) { return tlsphi_at(s, s->rows.theta, a); }
+
 /* Runs task(arg, i) for every block i. */
 static void tlsphi_run_tasks(const tlsph_solver *s, tlsph_task_fn task, void *arg) {
     tlsphi_parallel(s->run, s->run_user, s->threads, task, arg, s->blocks);
@@ -3297,7 +3502,7 @@ static void tlsphi_run(tlsph_solver *s, tlsphi_block_fn fn) {
     tlsphi_run_tasks(s, tlsphi_phase_task, &phase);
 }
 
-static void tlsphi_cross3(const double a[3], const double b[3], double out[3]) {
+TLSPHI_INLINE void tlsphi_cross3(const double a[3], const double b[3], double out[3]) {
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
@@ -3332,11 +3537,11 @@ static void tlsphi_load_measures(const tlsph_solver *s, const tlsphi_state *u, c
     pt->J = s->has_J ? u->J[a] : pt->d;
 }
 
-/* Adds W(J - d) to the energy (MEE: to the entropy), returns W' and W''/kappa. */
-static tlsph_real tlsphi_add_drift(const tlsph_solver *s, const tlsphi_material *m, tlsphi_point *pt) {
-    const tlsph_real stiffness = s->drift_stiffness * m->mu;
+/* Adds W(J - d) to the energy (MEE: to the entropy), sets W''/kappa and returns W'. */
+TLSPHI_INLINE tlsph_real tlsphi_add_drift(const tlsphi_material *m, tlsph_real stiffness, tlsph_real scale,
+                                          tlsphi_point *pt) {
     tlsph_real W, dW, ddW;
-    tlsphi_drift(pt->J - pt->d, s->drift_scale, &W, &dW, &ddW);
+    tlsphi_drift(pt->J - pt->d, scale, &W, &dW, &ddW);
     if (m->entropic) pt->r.entropy -= stiffness * W / m->theta_R;
     else pt->r.energy += stiffness * W;
     pt->drift_ratio = stiffness * ddW / m->kappa;
@@ -3371,7 +3576,7 @@ static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state 
         tlsphi_respond_von_mises(m, pt->F, pt->d, pt->J, s->thermal, &pt->plastic, &pt->r);
         if (s->thermal) pt->r.energy += (1 - m->heating) * tlsphi_plastic_work(m, pt->plastic.strain);
         memset(&pt->dev, 0, sizeof pt->dev);
-    } else if (s->has_H && !joint && m->gamma != 0) {
+    } else if (s->has_H && !joint && m->mooney) {
         tlsph_real H[9]; /* the deviatoric part sees the true cofactor */
         tlsph_cofactor(pt->F, H);
         tlsphi_respond(m, pt->F, H, pt->d, pt->J, s->thermal, &pt->r, &pt->dev);
@@ -3380,10 +3585,21 @@ static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state 
     }
     pt->kinetic = tlsphi_dot(dim, u->p + (size_t)dim * a, u->p + (size_t)dim * a) / (2 * m->rho);
     pt->drift_ratio = 0;
-    pt->Sigma_J = s->has_J && !joint ? tlsphi_add_drift(s, m, pt) : pt->dev.c;
+    pt->Sigma_J = s->has_J && !joint ? tlsphi_add_drift(m, s->drift_stiffness * m->mu, s->drift_scale, pt) : pt->dev.c;
     return TLSPH_OK;
 }
 
+/* Stress, Sigma_J and wave speeds at the temperature theta; p: Sigma_J without the drift's part, or the pressure. */
+TLSPHI_INLINE void tlsphi_conclude(const tlsphi_material *m, tlsph_real theta, tlsph_real pressure, tlsphi_point *pt) {
+    const tlsph_real per_rho = 1 / m->rho;
+    pt->theta = theta;
+    pt->p = pressure;
+    TLSPHI_UNROLL for (int i = 0; i < 9; i++) pt->P[i] =
+        pt->r.e_F[i] - theta * pt->r.eta_F[i] + pt->p * pt->H[i];
+    pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta / m->theta_R : 1);
+    pt->c_p = tlsphi_square_root(tlsphi_max(pt->r.p_modulus[0] + theta * pt->r.p_modulus[1], 0) * per_rho);
+    pt->c_s = tlsphi_square_root(tlsphi_max(pt->r.s_modulus[0] + theta * pt->r.s_modulus[1], 0) * per_rho);
+}
 /* Everything at a particle. */
 static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state *u, size_t a,
                                       const tlsph_response *user, tlsphi_point *pt) {
@@ -3393,22 +3609,15 @@ static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state 
     const tlsph_real theta = pt->theta = tlsphi_temperature(s, u, m, a, pt);
     if (!tlsphi_finite(theta)) return TLSPH_ERROR_NOT_FINITE;
     if (!(theta > 0)) return TLSPH_ERROR_TEMPERATURE;
-    pt->p = pt->r.e_J - theta * pt->r.eta_J;
-    if (u->q) {
-        pt->p = u->q[a];
-        pt->r.energy += m->compressibility * pt->p * pt->p / 2;
-    }
-    for (int i = 0; i < 9; i++) pt->P[i] = pt->r.e_F[i] - theta * pt->r.eta_F[i] + pt->p * pt->H[i];
-    pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta / m->theta_R : 1);
-    pt->c_p = tlsphi_sqrt(tlsphi_max(pt->r.p_modulus[0] + theta * pt->r.p_modulus[1], 0) / m->rho);
-    pt->c_s = tlsphi_sqrt(tlsphi_max(pt->r.s_modulus[0] + theta * pt->r.s_modulus[1], 0) / m->rho);
+    if (u->q) pt->r.energy += m->compressibility * u->q[a] * u->q[a] / 2;
+    tlsphi_conclude(m, theta, u->q ? u->q[a] : pt->r.e_J - theta * pt->r.eta_J, pt);
     return tlsphi_all_finite(pt->P, 9) && tlsphi_finite(pt->kinetic) && tlsphi_finite(pt->c_p) ? TLSPH_OK
                                                                                                : TLSPH_ERROR_NOT_FINITE;
 }
 
 /* One callback for the run of particles [begin, end) that share a user's material. */
 static void tlsphi_user_responses(const tlsph_solver *s, size_t begin, size_t end, tlsph_response *out) {
-    tlsph_real F[9 * TLSPHI_CHUNK], J[TLSPHI_CHUNK];
+    tlsph_real F[9 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST];
     for (size_t start = begin, stop; start < end; start = stop) {
         const tlsphi_material *m = tlsphi_material_of(s, start);
         for (stop = start; stop < end && tlsphi_material_of(s, stop) == m; stop++) {
@@ -3469,30 +3678,31 @@ static tlsph_real tlsphi_largest_stretch_of_areas(const tlsphi_point *pt) {
 }
 /* Writes what neighbours read. */
 static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
-    const int dim = s->dim;
-    const size_t D = (size_t)dim, dd = D * D;
+    const int dim = s->dim, dd = dim * dim;
+    const size_t D = (size_t)dim;
+    const tlsphi_rows *r = &s->rows;
     const tlsphi_material *m = tlsphi_material_of(s, a);
-    tlsph_real P[9], H[9];
+    const tlsph_real spread = s->metal ? tlsphi_largest_stretch_of_areas(pt) : 1;
+    const tlsph_real wave[4] = {pt->c_p / spread, pt->c_s / spread, m->rho, pt->drift_ratio};
+    tlsph_real P[9], H[9], PM[9], A[9], *v = s->v + D * a;
     tlsphi_shrink(dim, pt->P, P);
     tlsphi_shrink(dim, pt->H, H);
     for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++)
         tlsphi_mirror_tensor(dim, mirror, P);
     if (s->M) {
-        tlsphi_product(dim, P, s->M + dd * a, s->PM + dd * a);
-        tlsphi_product(dim, H, s->M + dd * a, s->A + dd * a);
-    } else {
-        memcpy(s->PM + dd * a, P, dd * sizeof *P);
-        memcpy(s->A + dd * a, H, dd * sizeof *H);
+        tlsphi_product(dim, P, s->M + D * D * a, PM);
+        tlsphi_product(dim, H, s->M + D * D * a, A);
     }
-    for (size_t i = 0; i < D; i++) s->v[D * a + i] = s->now.p[D * a + i] / m->rho;
-    const tlsph_real spread = s->metal ? tlsphi_largest_stretch_of_areas(pt) : 1;
-    s->wave[4 * a] = pt->c_p / spread;
-    s->wave[4 * a + 1] = pt->c_s / spread;
-    s->wave[4 * a + 2] = m->rho;
-    s->wave[4 * a + 3] = pt->drift_ratio;
-    if (s->S) s->S[a] = pt->Sigma_J;
-    if (s->theta) s->theta[a] = pt->theta;
-    if (s->h_J) s->h_J[a] = m->kind == TLSPH_LINEAR ? m->h : m->h / pt->J; /* linear: H = I, J = 1 in (000-13) */
+    for (size_t i = 0; i < D; i++) v[i] = s->now.p[D * a + i] / m->rho;
+    tlsphi_row_put(s, r->v, dim, a, v);
+    if (!s->projection) tlsphi_row_put(s, r->w, dim, a, v);
+    tlsphi_row_put(s, r->PM, dd, a, s->M ? PM : P);
+    tlsphi_row_put(s, r->A, dd, a, s->M ? A : H);
+    tlsphi_row_put(s, r->wave, 4, a, wave);
+    if (s->has_J) *tlsphi_at(s, r->S, a) = pt->Sigma_J;
+    if (s->thermal) *tlsphi_at(s, r->theta, a) = pt->theta;
+    if (s->conducts) /* linear: H = I, J = 1 in (000-13) */
+        *tlsphi_at(s, r->h_J, a) = m->kind == TLSPH_LINEAR ? m->h : m->h / pt->J;
 }
 
 /* Plastic flow of one particle since the beginning of the step. Returns 1 if there was any. */
@@ -3528,31 +3738,207 @@ static void tlsphi_flow_block(tlsph_solver *s, tlsphi_block *block) {
         if (tlsphi_flow(s, a) && s->thermal) tlsphi_heat_of_flow(s, a);
 }
 
-static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
-    tlsph_response user[TLSPHI_CHUNK];
+/* One particle in full. Returns 0 if its state is impossible. */
+static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t a, const tlsph_response *user) {
     tlsphi_point pt;
+    double heat;
+    const tlsph_result result = tlsphi_constitute(s, &s->now, a, user, &pt);
+    if (result) {
+        block->failed = (uint32_t)a;
+        block->failure = result;
+        return 0;
+    }
+    tlsphi_publish(s, a, &pt);
+    if (s->least_stretch) {
+        double stretches[3];
+        tlsphi_stretches(pt.F, stretches);
+        s->least_stretch[a] = (tlsph_real)stretches[2];
+    }
+    block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, a, &pt, &heat));
+    block->heat_step = tlsphi_dmin(block->heat_step, heat);
+    return 1;
+}
+
+/* -- the same for a tile of one material, by lanes: the built-in laws but for powers of J, isothermal or with E -- */
+
+/* A tile's state as lanes. */
+typedef struct tlsphi_state_lanes {
+    tlsph_real F[9 * TLSPHI_LANES_MOST], H[9 * TLSPHI_LANES_MOST], v[3 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST],
+        E[TLSPHI_LANES_MOST], c_p[TLSPHI_LANES_MOST], heat[TLSPHI_LANES_MOST], good[TLSPHI_LANES_MOST];
+} tlsphi_state_lanes;
+
+static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
+    const tlsphi_material *m = tlsphi_material_of(s, begin);
+    if (end - begin < TLSPHI_LANES || s->thermal == TLSPH_ENTROPY || s->incompressible || s->least_stretch || s->metal ||
+        s->coupling == TLSPH_JOINT_AS_PRINTED || !tlsphi_has_invariants(m->kind) || m->q != 1 || (s->has_H && m->mooney))
+        return 0;
+    for (size_t a = begin; a < end; a++)
+        if (tlsphi_material_of(s, a) != m || tlsphi_mirrors_of(s, a)) return 0;
+    return 1;
+}
+/* n components a particle become n lanes. */
+TLSPHI_INLINE void tlsphi_transpose(const tlsph_real *from, const size_t n, tlsph_real *to) {
+    for (size_t l = 0; l < TLSPHI_LANES; l++)
+        TLSPHI_UNROLL for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
+}
+/* Takes F and H from the lanes, completed in plane strain; H = cof F where it is not evolved. */
+TLSPHI_INLINE void tlsphi_take_measures(const tlsphi_state_lanes *x, size_t l, const int dim, const int has_H, int has_J,
+                                        tlsphi_point *pt) {
+    tlsph_real F[9], H[9];
+    TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) F[i] = x->F[(size_t)i * TLSPHI_LANES + l];
+    tlsphi_expand(dim, F, 1, pt->F);
+    tlsphi_cofactor_inline(pt->F, pt->H);
+    pt->d = pt->F[0] * pt->H[0] + pt->F[1] * pt->H[1] + pt->F[2] * pt->H[2];
+    if (has_H) {
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) H[i] = x->H[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_expand(dim, H, pt->d, pt->H);
+    }
+    pt->J = has_J ? x->J[l] : pt->d;
+}
+/* Writes the rows of a tile at `row`, c_p, and whether all is well. dim, has_H, entropic, mooney are constants. */
+TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_material *given, tlsphi_state_lanes *x,
+                                           tlsph_real *row, const int dim, const int has_H, const int entropic,
+                                           const int mooney) {
+    const int dd = dim * dim, has_J = s->has_J, heated = s->thermal == TLSPH_ENERGY, conducts = s->conducts;
+    const tlsphi_rows r = s->rows;
+    const tlsph_real stiffness = has_J ? s->drift_stiffness * given->mu : 0, scale = s->drift_scale;
+    tlsphi_material m = *given;
+    m.entropic = entropic;
+    m.mooney = mooney;
+    m.q = 1;
+    tlsph_real *const P = row + (size_t)r.PM * TLSPHI_ROW, *const A = row + (size_t)r.A * TLSPHI_ROW;
+    tlsph_real *const wave = row + (size_t)r.wave * TLSPHI_ROW;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsphi_point pt;
+        tlsph_real out[9];
+        tlsphi_take_measures(x, l, dim, has_H, has_J, &pt);
+        tlsphi_respond_inline(&m, pt.F, pt.H, pt.d, pt.J, heated, &pt.r, &pt.dev);
+        pt.Sigma_J = tlsphi_add_drift(&m, stiffness, scale, &pt);
+        pt.kinetic = 0;
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) pt.kinetic +=
+            x->v[(size_t)i * TLSPHI_LANES + l] * x->v[(size_t)i * TLSPHI_LANES + l];
+        pt.kinetic *= m.rho / 2;
+        const tlsph_real theta = m.theta_R + (heated ? (x->E[l] - pt.kinetic - pt.r.energy) / m.c_v : 0);
+        tlsphi_conclude(&m, theta, pt.r.e_J - theta * pt.r.eta_J, &pt);
+        tlsphi_shrink(dim, pt.P, out);
+        TLSPHI_UNROLL for (int i = 0; i < dd; i++) P[(size_t)i * TLSPHI_ROW + l] = out[i];
+        tlsphi_shrink(dim, pt.H, out);
+        TLSPHI_UNROLL for (int i = 0; i < dd; i++) A[(size_t)i * TLSPHI_ROW + l] = out[i];
+        wave[l] = x->c_p[l] = pt.c_p;
+        wave[TLSPHI_ROW + l] = pt.c_s;
+        wave[2 * TLSPHI_ROW + l] = m.rho;
+        wave[3 * TLSPHI_ROW + l] = has_J ? pt.drift_ratio : 0;
+        x->J[l] = pt.J;
+        x->E[l] = theta;
+        x->heat[l] = pt.Sigma_J;
+        tlsph_real all = pt.d + pt.J + theta + pt.c_p + pt.kinetic; /* finite only if all of them are */
+        TLSPHI_UNROLL for (int i = 0; i < 9; i++) all += pt.P[i];
+        x->good[l] = (pt.d > 0) & (pt.J > 0) & (theta > 0) & tlsphi_finite(all) ? TLSPHI_R(1) : TLSPHI_R(0);
+    }
+    for (size_t l = 0; has_J && l < TLSPHI_LANES; l++) row[(size_t)r.S * TLSPHI_ROW + l] = x->heat[l];
+    for (size_t l = 0; heated && l < TLSPHI_LANES; l++) row[(size_t)r.theta * TLSPHI_ROW + l] = x->E[l];
+    for (size_t l = 0; conducts && l < TLSPHI_LANES; l++) row[(size_t)r.h_J * TLSPHI_ROW + l] = m.h / x->J[l];
+}
+#define TLSPHI_CONSTITUTE(dim, H, entropic, mooney)                                                                    \
+    static void tlsphi_constitute_##dim##H##entropic##mooney(const tlsph_solver *s, const tlsphi_material *m,          \
+                                                             tlsphi_state_lanes *x, tlsph_real *row) {                 \
+        tlsphi_constitute_lanes(s, m, x, row, dim, H, entropic, mooney);                                               \
+    }
+TLSPHI_CONSTITUTE(2, 0, 0, 0)
+TLSPHI_CONSTITUTE(2, 0, 0, 1)
+TLSPHI_CONSTITUTE(2, 0, 1, 0)
+TLSPHI_CONSTITUTE(2, 0, 1, 1)
+TLSPHI_CONSTITUTE(2, 1, 0, 0)
+TLSPHI_CONSTITUTE(2, 1, 1, 0)
+TLSPHI_CONSTITUTE(3, 0, 0, 0)
+TLSPHI_CONSTITUTE(3, 0, 0, 1)
+TLSPHI_CONSTITUTE(3, 0, 1, 0)
+TLSPHI_CONSTITUTE(3, 0, 1, 1)
+TLSPHI_CONSTITUTE(3, 1, 0, 0)
+TLSPHI_CONSTITUTE(3, 1, 1, 0)
+
+static void tlsphi_constitute_tile(const tlsph_solver *s, const tlsphi_material *m, tlsphi_state_lanes *x,
+                                   tlsph_real *row) {
+    switch ((s->dim == 3 ? 8 : 0) + (s->has_H ? 4 : 0) + (m->entropic ? 2 : 0) + (m->mooney ? 1 : 0)) {
+    case 0: tlsphi_constitute_2000(s, m, x, row); break;
+    case 1: tlsphi_constitute_2001(s, m, x, row); break;
+    case 2: tlsphi_constitute_2010(s, m, x, row); break;
+    case 3: tlsphi_constitute_2011(s, m, x, row); break;
+    case 4: tlsphi_constitute_2100(s, m, x, row); break;
+    case 6: tlsphi_constitute_2110(s, m, x, row); break;
+    case 8: tlsphi_constitute_3000(s, m, x, row); break;
+    case 9: tlsphi_constitute_3001(s, m, x, row); break;
+    case 10: tlsphi_constitute_3010(s, m, x, row); break;
+    case 11: tlsphi_constitute_3011(s, m, x, row); break;
+    case 12: tlsphi_constitute_3100(s, m, x, row); break;
+    default: tlsphi_constitute_3110(s, m, x, row); break;
+    }
+}
+/* P M and H M in the rows of a tile. */
+TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, const int dim) {
+    tlsph_real lanes[9 * TLSPHI_LANES_MOST];
+    tlsphi_transpose(M, (size_t)(dim * dim), lanes);
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real A[9], B[9], C[9];
+        tlsphi_take_rows(dim * dim, row + l, A);
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) B[i] = lanes[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_product(dim, A, B, C);
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) row[(size_t)i * TLSPHI_ROW + l] = C[i];
+    }
+}
+/* Longest steps of the particles of a tile: as tlsphi_particle_step. */
+static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_material *m,
+                             const tlsphi_state_lanes *x) {
+    for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsphi_point pt;
+        double heat;
+        pt.c_p = x->c_p[l];
+        if (s->conducts && m->h > 0) tlsphi_load_measures(s, &s->now, m, begin + l, &pt);
+        block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, begin + l, &pt, &heat));
+        block->heat_step = tlsphi_dmin(block->heat_step, heat);
+    }
+}
+TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, size_t begin, const int dim) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsphi_material *m = tlsphi_material_of(s, begin);
+    const tlsph_real per_rho = 1 / m->rho;
+    tlsph_real *row = tlsphi_at(s, 0, begin), good = 1;
+    tlsphi_state_lanes x;
+    for (size_t i = 0; i < D * TLSPHI_LANES; i++) s->v[D * begin + i] = s->now.p[D * begin + i] * per_rho;
+    tlsphi_transpose(s->v + D * begin, D, x.v);
+    tlsphi_transpose(s->now.F + dd * begin, dd, x.F);
+    if (s->has_H) tlsphi_transpose(s->now.H + dd * begin, dd, x.H);
+    if (s->has_J) memcpy(x.J, s->now.J + begin, TLSPHI_LANES * sizeof *x.J);
+    if (s->thermal) memcpy(x.E, s->now.E + begin, TLSPHI_LANES * sizeof *x.E);
+    tlsphi_constitute_tile(s, m, &x, row);
+    for (size_t l = 0; l < TLSPHI_LANES; l++) good *= x.good[l];
+    if (good < 1) return 0;
+    for (size_t i = 0; i < D; i++) {
+        memcpy(row + ((size_t)s->rows.v + i) * TLSPHI_ROW, x.v + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *x.v);
+        if (!s->projection)
+            memcpy(row + ((size_t)s->rows.w + i) * TLSPHI_ROW, x.v + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *x.v);
+    }
+    if (s->M) {
+        tlsphi_correct_rows(s->M + dd * begin, row + (size_t)s->rows.PM * TLSPHI_ROW, dim);
+        tlsphi_correct_rows(s->M + dd * begin, row + (size_t)s->rows.A * TLSPHI_ROW, dim);
+    }
+    tlsphi_tile_step(s, block, begin, m, &x);
+    return 1;
+}
+static int tlsphi_evaluate_lanes(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t end) {
+    if (!tlsphi_takes_lanes(s, begin, end)) return 0;
+    return s->dim == 3 ? tlsphi_evaluate_tile(s, block, begin, 3) : tlsphi_evaluate_tile(s, block, begin, 2);
+}
+static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
+    tlsph_response user[TLSPHI_LANES_MOST];
     block->failed = TLSPHI_NONE;
     block->time_step = block->heat_step = TLSPHI_LARGEST;
-    for (size_t begin = block->begin; begin < block->end; begin += TLSPHI_CHUNK) {
-        const size_t end = begin + TLSPHI_CHUNK < block->end ? begin + TLSPHI_CHUNK : block->end;
+    for (size_t begin = block->begin, end; begin < block->end; begin = end) {
+        end = tlsphi_tile_end(block, begin);
+        if (tlsphi_evaluate_lanes(s, block, begin, end)) continue; /* where it fails, the next lines find the particle */
         if (s->has_user) tlsphi_user_responses(s, begin, end, user);
-        for (size_t a = begin; a < end; a++) {
-            const tlsph_result result = tlsphi_constitute(s, &s->now, a, user + (a - begin), &pt);
-            if (result) {
-                block->failed = (uint32_t)a;
-                block->failure = result;
-                return;
-            }
-            tlsphi_publish(s, a, &pt);
-            if (s->least_stretch) {
-                double stretches[3];
-                tlsphi_stretches(pt.F, stretches);
-                s->least_stretch[a] = (tlsph_real)stretches[2];
-            }
-            double heat;
-            block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, a, &pt, &heat));
-            block->heat_step = tlsphi_dmin(block->heat_step, heat);
-        }
+        for (size_t a = begin; a < end; a++)
+            if (!tlsphi_evaluate_particle(s, block, a, user + (a - begin))) return;
     }
 }
 static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block); /* [PAIR-STEP] */
@@ -3617,19 +4003,20 @@ static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block) {
    the round-off of Sigma_J is large, and 1e-8 was too little for a twisting column. */
 #define TLSPHI_LIMITER_FLOOR TLSPHI_R(TLSPHI_EPSILON > 1e-10 ? 3e-4 : 1e-6)
 
-/* Density in the impedance of a pair: the harmonic mean, which is at most twice the lighter one. With the plain mean the
-   lighter side is stopped in less than a step where its neighbour has many times its density, and nothing is stable. */
-TLSPHI_INLINE tlsph_real tlsphi_pair_density(tlsph_real a, tlsph_real b) { return a == b ? a : 2 * a * b / (a + b); }
+/* Density in the impedance of a pair: the mean, but at most twice the lighter one. With the plain mean the lighter side is
+   stopped in less than a step where its neighbour has many times its density, and nothing is stable. */
+TLSPHI_INLINE tlsph_real tlsphi_pair_density(tlsph_real a, tlsph_real b) {
+    return tlsphi_min((a + b) / 2, 2 * tlsphi_min(a, b));
+}
 
-/* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; front in [0, 1] gives the normal part
-   of the raw jump back. */
-TLSPHI_INLINE void tlsphi_damp_velocity(int dim, int kind, const tlsph_real *Dv, const tlsph_real *Dr,
-                                        const tlsph_real *n, tlsph_real front, tlsph_real half_impedance,
-                                        tlsph_real c_p, tlsph_real c_s, tlsph_real *D_p) {
+/* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; n: any vector along the normal, inverse
+   1/(n.n); front in [0, 1] gives the normal part of the raw jump back. */
+TLSPHI_INLINE void tlsphi_damp_velocity(const int dim, const int kind, const tlsph_real *Dv, const tlsph_real *Dr,
+                                        const tlsph_real *n, tlsph_real inverse, tlsph_real front,
+                                        tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real *D_p) {
     const tlsph_real *jump = kind == TLSPH_FIRST_ORDER || kind == TLSPH_AS_PRINTED ? Dv : Dr;
-    tlsph_real normal = tlsphi_dot(dim, n, jump), tangent[3];
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) tangent[i] = jump[i] - normal * n[i];
-    tlsph_real keep = 1;
+    tlsph_real normal = tlsphi_dot(dim, n, jump), tangent[3], keep = 1;
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) tangent[i] = jump[i] - normal * inverse * n[i];
     if (kind == TLSPH_LIMITED) {
         const tlsph_real raw = tlsphi_dot(dim, n, Dv);
         /* tangent is perpendicular to n, so its product with Dv is that with the tangential part of Dv */
@@ -3638,7 +4025,7 @@ TLSPHI_INLINE void tlsphi_damp_velocity(int dim, int kind, const tlsph_real *Dv,
         normal = normal * raw > TLSPHI_LIMITER_FLOOR * normal * normal ? normal : 0;
         normal += front * (raw - normal);
     }
-    const tlsph_real across = keep * half_impedance * c_s, along = half_impedance * c_p * normal;
+    const tlsph_real across = keep * half_impedance * c_s, along = half_impedance * c_p * normal * inverse;
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) D_p[i] = across * tangent[i] + along * n[i];
 }
 /* The jump of a scalar that is damped; Dr: with its linear part taken away. */
@@ -3655,19 +4042,20 @@ TLSPHI_INLINE tlsph_real tlsphi_damped_jump(int kind, tlsph_real D, tlsph_real D
    each other by more than TLSPHI_FRONT_LOW of the p speed (raw < 0), and the jumps of the far sides, 2 slope - raw, are
    unlike raw. For rho = far/raw the van Albada function phi = rho (rho + 1)/(rho^2 + 1) is 1 +- O(h) in smooth flow and
    0 at the foot of a front, so front is O(h^2) where there is none, and exactly 0 in gentle flow. */
-static tlsph_real tlsphi_smoothness(tlsph_real raw, tlsph_real slope) {
+TLSPHI_INLINE tlsph_real tlsphi_smoothness(tlsph_real raw, tlsph_real slope) {
     const tlsph_real rho = 2 * slope / raw - 1;
     return tlsphi_max(0, tlsphi_min(1, rho * (rho + 1) / (rho * rho + 1)));
 }
-static tlsph_real tlsphi_front(tlsph_real raw, tlsph_real slope_a, tlsph_real slope_b, tlsph_real c_p) {
+TLSPHI_INLINE tlsph_real tlsphi_front(tlsph_real raw, tlsph_real slope_a, tlsph_real slope_b, tlsph_real c_p) {
     const tlsph_real rough = 1 - tlsphi_min(tlsphi_smoothness(raw, slope_a), tlsphi_smoothness(raw, slope_b));
-    const tlsph_real strength = tlsphi_min(1, (-raw / c_p - TLSPHI_R(TLSPHI_FRONT_LOW)) / TLSPHI_R(TLSPHI_FRONT_LOW));
-    return strength * tlsphi_min(1, TLSPHI_R(TLSPHI_FRONT_GAIN) * rough * rough);
+    const tlsph_real strength = (-raw / c_p - TLSPHI_R(TLSPHI_FRONT_LOW)) / TLSPHI_R(TLSPHI_FRONT_LOW);
+    const tlsph_real front = tlsphi_min(1, strength) * tlsphi_min(1, TLSPHI_R(TLSPHI_FRONT_GAIN) * rough * rough);
+    return strength > 0 ? front : 0; /* otherwise `rough` may be 0/0 */
 }
 /* S_J (000-73) times the share a_J, weakened where the drift potential is stiff; cc = |c|^2, CC = |C|. */
 TLSPHI_INLINE tlsph_real tlsphi_jacobian_factor(tlsph_real a_J, tlsph_real cc, tlsph_real CC, tlsph_real rho,
                                                 tlsph_real c_p, tlsph_real mean_ratio) {
-    return a_J * cc / (2 * rho * c_p * CC * (1 + mean_ratio));
+    return a_J * cc / (2 * rho * c_p * CC * (1 + mean_ratio) + TLSPHI_TINY); /* 0 where C is */
 }
 
 /* (66) and (76), with x/(x^2 + 1e-12) for 1/x where the temperatures meet. */
@@ -3681,8 +4069,8 @@ static void tlsphi_dissipation_as_printed(const tlsph_pair_side *a, const tlsph_
         jump[i] = b->velocity[i] / Xb - a->velocity[i] / Xa;
     }
     const tlsph_real DS = b->Sigma_J - a->Sigma_J, jump_S = b->Sigma_J / Xb - a->Sigma_J / Xa;
-    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, jump, jump, n, 0, half_impedance, c_p, c_s, out->D_p);
-    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, Dv, Dv, n, 0, half_impedance, c_p, c_s, D_v);
+    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, jump, jump, n, 1, 0, half_impedance, c_p, c_s, out->D_p);
+    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, Dv, Dv, n, 1, 0, half_impedance, c_p, c_s, D_v);
     out->D_J = S_J * jump_S;
     const tlsph_real wanted = tlsphi_dot(3, Dv, D_v) + S_J * DS * DS;
     const tlsph_real bracket = wanted - tlsphi_dot(3, jump, out->D_p) - S_J * jump_S * jump_S;
@@ -3719,8 +4107,8 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
     }
     const tlsph_real DS = b->Sigma_J - a->Sigma_J;
     const tlsph_real DSr = DS - (tlsphi_dot(3, a->Sigma_J_gradient, d) + tlsphi_dot(3, b->Sigma_J_gradient, d)) / 2;
-    tlsphi_damp_velocity(3, (int)kind, Dv, Dr, n, front, tlsphi_pair_density(a->density, b->density) * CC / 2, c_p, c_s,
-                         out->D_p);
+    tlsphi_damp_velocity(3, (int)kind, Dv, Dr, n, 1, front, tlsphi_pair_density(a->density, b->density) * CC / 2, c_p,
+                         c_s, out->D_p);
     out->D_J = S_J * tlsphi_damped_jump((int)kind, DS, DSr, front);
     for (int i = 0; i < 3; i++) out->D_E += (a->velocity[i] + b->velocity[i]) / 2 * out->D_p[i];
     out->D_E += (a->Sigma_J + b->Sigma_J) / 2 * out->D_J;
@@ -3730,42 +4118,141 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
 /* ==== [GRADIENTS] ==================================================================================================
    grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) g_ab M_a^T (000-53), for v and, where needed, Sigma_J and theta. */
 
-/* Corrects and stores a raw sum: out = G M^T. */
-TLSPHI_INLINE void tlsphi_store_gradient(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *G,
-                                         tlsph_real *out) {
-    if (s->M) tlsphi_product_transposed(dim, G, s->M + (size_t)(dim * dim) * a, out);
-    else memcpy(out, G, (size_t)(dim * dim) * sizeof *G);
+/* The neighbours of a slot, as the address of their row 0: where they lie, or, scattered, in the spare columns of this
+   task's own rows, into which the rows [first, end) are copied. */
+TLSPHI_INLINE const tlsph_real *tlsphi_gather(const tlsph_solver *s, const tlsphi_block *block, const tlsphi_graph *graph,
+                                              const tlsphi_slot *slot, int first, int end) {
+    if (!slot->scattered) return tlsphi_at(s, 0, slot->from);
+    tlsph_real *spare = s->row + (size_t)(block - s->block) * (size_t)s->rows.count * TLSPHI_ROW + TLSPHI_BLOCK;
+    size_t at[TLSPHI_LANES_MOST];
+    for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const size_t b = graph->gathered[slot->from + l];
+        at[l] = b / TLSPHI_BLOCK * (size_t)s->rows.count * TLSPHI_ROW + b % TLSPHI_BLOCK;
+    }
+    for (size_t r = (size_t)first; r < (size_t)end; r++) {
+        const tlsph_real *row = s->row + r * TLSPHI_ROW;
+        tlsph_real *out = spare + r * TLSPHI_ROW;
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = row[at[l]];
+    }
+    return spare;
 }
-TLSPHI_INLINE void tlsphi_store_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
-                                      tlsph_real *out) {
+/* G_ri += (f_b - f_a)_r g_i for consecutive rows r. */
+TLSPHI_INLINE void tlsphi_gradient_rows(const tlsph_real *a, const tlsph_real *b, const tlsph_real *g, const int dim,
+                                        const int rows, tlsph_real *G) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real C[3];
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) C[i] = g[(size_t)i * TLSPHI_LANES + l];
+        TLSPHI_UNROLL for (int r = 0; r < rows; r++) {
+            const tlsph_real jump = b[(size_t)r * TLSPHI_ROW + l] - a[(size_t)r * TLSPHI_ROW + l];
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) G[(size_t)(r * dim + i) * TLSPHI_LANES + l] += jump * C[i];
+        }
+    }
+}
+
+/* Corrects a raw sum of a scalar's gradient: out = M grad. */
+TLSPHI_INLINE void tlsphi_correct_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
+                                        tlsph_real *out) {
     if (s->M) tlsphi_multiply(dim, s->M + (size_t)(dim * dim) * a, grad, out);
     else memcpy(out, grad, (size_t)dim * sizeof *grad);
 }
-TLSPHI_INLINE void tlsphi_gradient_particle(const tlsph_solver *s, size_t a, const int dim, const int with_w,
-                                            const int with_S, const int with_theta) {
-    const size_t D = (size_t)dim, dd = D * D;
-    const tlsph_real *v_a = s->v + D * a, *w_a = s->w + D * a, half = 1 / (2 * s->V[a]);
-    tlsph_real G[9] = {0}, Gw[9] = {0}, gS[3] = {0}, gT[3] = {0};
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const size_t b = s->neighbour[k];
-        const tlsph_real *v_b = s->v + D * b, *w_b = s->w + D * b;
-        tlsph_real g[3], Dv[3];
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = s->g[D * k + (size_t)i] * half;
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dv[i] = v_b[i] - v_a[i];
-        tlsphi_add_outer(dim, G, Dv, g);
-        if (with_w) {
-            TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dv[i] = w_b[i] - w_a[i];
-            tlsphi_add_outer(dim, Gw, Dv, g);
-        }
-        if (with_S) TLSPHI_UNROLL for (int i = 0; i < dim; i++) gS[i] += (s->S[b] - s->S[a]) * g[i];
-        if (with_theta) TLSPHI_UNROLL for (int i = 0; i < dim; i++) gT[i] += (s->theta[b] - s->theta[a]) * g[i];
+/* Raw sums of a tile: v and w, Sigma_J, theta; by rows of lanes. */
+typedef struct tlsphi_slopes {
+    tlsph_real v[9 * TLSPHI_LANES_MOST], w[9 * TLSPHI_LANES_MOST], S[3 * TLSPHI_LANES_MOST],
+        theta[3 * TLSPHI_LANES_MOST];
+} tlsphi_slopes;
+/* Lanes [first, end) to the columns of rows. */
+TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, size_t first, size_t end, tlsph_real *row) {
+    for (size_t i = 0; i < (size_t)rows; i++) {
+        const tlsph_real *from = lanes + i * TLSPHI_LANES;
+        tlsph_real *to = row + i * TLSPHI_ROW;
+        if (end - first == TLSPHI_LANES) memcpy(to, from, TLSPHI_LANES * sizeof *to);
+        else
+            for (size_t l = first; l < end; l++) to[l] = from[l];
     }
-    /* E without its kinetic part changes by P : grad w (see [PROJECTION]); PM : (raw sum) is the adjoint of T_a */
-    if (s->rate_E) s->rate_E[a] = tlsphi_dot(dim * dim, s->PM + dd * a, with_w ? Gw : G);
-    tlsphi_store_gradient(s, a, dim, G, s->grad_v + dd * a);
-    if (with_w) tlsphi_store_gradient(s, a, dim, Gw, s->grad_w + dd * a);
-    if (with_S) tlsphi_store_slope(s, a, dim, gS, s->grad_S + D * a);
-    if (with_theta) tlsphi_store_slope(s, a, dim, gT, s->grad_theta + D * a);
+}
+/* G = scale G M^T for `rows` gradients a lane; M is NULL, or that of the tile's particles as lanes. */
+TLSPHI_INLINE void tlsphi_finish_gradients(const tlsph_real *scale, const tlsph_real *M, const int dim, const int rows,
+                                           tlsph_real *G) {
+    for (size_t i = 0; !M && i < (size_t)(rows * dim); i++)
+        for (size_t l = 0; l < TLSPHI_LANES; l++) G[i * TLSPHI_LANES + l] *= scale[l];
+    if (!M) return;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real A[9], g[3], out[3];
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) A[i] = M[(size_t)i * TLSPHI_LANES + l];
+        TLSPHI_UNROLL for (int r = 0; r < rows; r++) {
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = G[(size_t)(r * dim + i) * TLSPHI_LANES + l] * scale[l];
+            tlsphi_multiply(dim, A, g, out);
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) G[(size_t)(r * dim + i) * TLSPHI_LANES + l] = out[i];
+        }
+    }
+}
+/* scale P : G of each lane */
+TLSPHI_INLINE void tlsphi_contract(const int n, const tlsph_real *row, const tlsph_real *G, const tlsph_real *scale,
+                                   tlsph_real *out) {
+    for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = 0;
+    for (size_t i = 0; i < (size_t)n; i++)
+        for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] += row[i * TLSPHI_ROW + l] * G[i * TLSPHI_LANES + l];
+    for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] *= scale[l];
+}
+/* What becomes of the raw sums of the particles [begin, end) of a tile. E without its kinetic part changes by P : grad w
+   (see [PROJECTION]), J by H : grad v; PM : (raw sum) and HM : (raw sum) are the same, and adjoint to T_a. */
+TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, size_t begin, size_t end, const int dim, int with_w,
+                                       int with_S, int with_theta, tlsphi_slopes *sum) {
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
+    const int dd = dim * dim;
+    tlsph_real *row = tlsphi_at(s, 0, base), *M = NULL;
+    tlsph_real correction[9 * TLSPHI_LANES_MOST], scale[TLSPHI_LANES_MOST] = {0}, rate[TLSPHI_LANES_MOST];
+    for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
+    for (size_t l = first; s->M && l < last; l++)
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) correction[i * TLSPHI_LANES + l] =
+            s->M[(size_t)dd * (base + l) + i];
+    if (s->M) M = correction;
+    tlsph_real *const w = with_w ? sum->w : sum->v;
+    if (s->rate_E) {
+        tlsphi_contract(dd, row + (size_t)s->rows.PM * TLSPHI_ROW, w, scale, rate);
+        for (size_t l = first; l < last; l++) s->rate_E[base + l] = rate[l];
+    }
+    if (s->rate_J) {
+        tlsphi_contract(dd, row + (size_t)s->rows.A * TLSPHI_ROW, sum->v, scale, rate);
+        for (size_t l = first; l < last; l++) s->rate_J[base + l] = rate[l];
+    }
+    tlsphi_finish_gradients(scale, M, dim, dim, sum->v);
+    if (with_w) tlsphi_finish_gradients(scale, M, dim, dim, sum->w);
+    for (size_t l = first; l < last; l++)
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) s->grad_v[(size_t)dd * (base + l) + i] =
+            sum->v[i * TLSPHI_LANES + l];
+    tlsphi_store_rows(dd, w, first, last, row + (size_t)s->rows.grad_w * TLSPHI_ROW);
+    if (with_S) {
+        tlsphi_finish_gradients(scale, M, dim, 1, sum->S);
+        tlsphi_store_rows(dim, sum->S, first, last, row + (size_t)s->rows.slope_S * TLSPHI_ROW);
+    }
+    if (with_theta) {
+        tlsphi_finish_gradients(scale, M, dim, 1, sum->theta);
+        tlsphi_store_rows(dim, sum->theta, first, last, row + (size_t)s->rows.slope_theta * TLSPHI_ROW);
+    }
+}
+TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin,
+                                        size_t end, const int dim, int with_w, int with_S, int with_theta) {
+    const tlsphi_graph *graph = &s->graph;
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
+    const tlsph_real *a = tlsphi_at(s, 0, base);
+    const size_t S = (size_t)s->rows.S * TLSPHI_ROW, theta = (size_t)s->rows.theta * TLSPHI_ROW;
+    tlsphi_slopes sum;
+    memset(&sum, 0, sizeof sum);
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const tlsphi_slot *slot = graph->slot + k;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)(dim + 1) * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, 0, with_w ? 2 * dim : dim);
+        if (slot->scattered && with_S) tlsphi_gather(s, block, graph, slot, s->rows.S, s->rows.S + 1);
+        if (slot->scattered && with_theta) tlsphi_gather(s, block, graph, slot, s->rows.theta, s->rows.theta + 1);
+        tlsphi_gradient_rows(a, b, g, dim, dim, sum.v);
+        if (with_w)
+            tlsphi_gradient_rows(a + (size_t)dim * TLSPHI_ROW, b + (size_t)dim * TLSPHI_ROW, g, dim, dim,
+                                 sum.w);
+        if (with_S) tlsphi_gradient_rows(a + S, b + S, g, dim, 1, sum.S);
+        if (with_theta) tlsphi_gradient_rows(a + theta, b + theta, g, dim, 1, sum.theta);
+    }
+    tlsphi_store_slopes(s, begin, end, dim, with_w, with_S, with_theta, &sum);
 }
 
 /* The part of r_ab ([BONDS]): a gather of its own, so that other operators have no branch in theirs. */
@@ -3773,54 +4260,69 @@ static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real half = 1 / (2 * s->V[a]);
-    tlsph_real G[9] = {0}, Gw[9] = {0};
+    const tlsphi_rows *r = &s->rows;
+    tlsph_real G[9] = {0}, Gw[9] = {0}, PM[9];
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
-        tlsph_real r[3], Dv[3], Dw[3];
+        const tlsph_real *w_a = tlsphi_at(s, r->w, a), *w_b = tlsphi_at(s, r->w, b);
+        tlsph_real rest[3], Dv[3], Dw[3];
         for (size_t i = 0; i < D; i++) {
-            r[i] = s->rest[D * k + i] * half;
+            rest[i] = s->rest[D * k + i] * half;
             Dv[i] = s->v[D * b + i] - s->v[D * a + i];
-            Dw[i] = s->w[D * b + i] - s->w[D * a + i];
-            if (s->grad_S) s->grad_S[D * a + i] += (s->S[b] - s->S[a]) * r[i];
-            if (s->grad_theta) s->grad_theta[D * a + i] += (s->theta[b] - s->theta[a]) * r[i];
+            Dw[i] = w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW];
+            if (s->has_J)
+                tlsphi_at(s, r->slope_S, a)[i * TLSPHI_ROW] += (*tlsphi_at(s, r->S, b) - *tlsphi_at(s, r->S, a)) * rest[i];
+            if (s->conducts)
+                tlsphi_at(s, r->slope_theta, a)[i * TLSPHI_ROW] +=
+                    (*tlsphi_at(s, r->theta, b) - *tlsphi_at(s, r->theta, a)) * rest[i];
         }
-        tlsphi_add_outer(dim, G, Dv, r);
-        tlsphi_add_outer(dim, Gw, Dw, r);
+        tlsphi_add_outer(dim, G, Dv, rest);
+        tlsphi_add_outer(dim, Gw, Dw, rest);
     }
-    if (s->rate_E) s->rate_E[a] += tlsphi_dot(dim * dim, s->PM + dd * a, Gw);
+    tlsphi_row_get(s, r->PM, (int)dd, a, PM);
+    if (s->rate_E) s->rate_E[a] += tlsphi_dot(dim * dim, PM, Gw);
     for (size_t i = 0; i < dd; i++) s->grad_v[dd * a + i] += G[i];
-    for (size_t i = 0; s->grad_w != s->grad_v && i < dd; i++) s->grad_w[dd * a + i] += Gw[i];
+    for (size_t i = 0; i < dd; i++) tlsphi_at(s, r->grad_w, a)[i * TLSPHI_ROW] += Gw[i];
 }
 
 static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
-    const size_t D = (size_t)s->dim;
+    const int dim = s->dim, dd = dim * dim;
+    const tlsphi_rows *r = &s->rows;
+    tlsph_real Gw[9], slope[3];
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
-        tlsphi_mirror_tensor(s->dim, m, s->grad_v + D * D * a);
-        if (s->projection) tlsphi_mirror_tensor(s->dim, m, s->grad_w + D * D * a);
-        if (s->grad_S && !m->tangent) tlsphi_mirror_vector(s->dim, m, s->grad_S + D * a);
-        if (s->grad_theta && !m->tangent && !m->conducts) tlsphi_mirror_vector(s->dim, m, s->grad_theta + D * a);
+        tlsphi_mirror_tensor(dim, m, s->grad_v + (size_t)dd * a);
+        tlsphi_row_get(s, r->grad_w, dd, a, Gw);
+        tlsphi_mirror_tensor(dim, m, Gw);
+        tlsphi_row_put(s, r->grad_w, dd, a, Gw);
+        for (int i = 0; i < 2; i++) {
+            const int row = i ? r->slope_theta : r->slope_S;
+            if (m->tangent || !(i ? s->conducts && !m->conducts : s->has_J)) continue;
+            tlsphi_row_get(s, row, dim, a, slope);
+            tlsphi_mirror_vector(dim, m, slope);
+            tlsphi_row_put(s, row, dim, a, slope);
+        }
     }
 }
 
 /* M^T Q / theta with Q = -h/J H^T H grad theta (000-56). Q is mirrored like the gradient, so that both stay adjoint. */
 static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
     const int dim = s->dim;
-    const size_t D = (size_t)dim;
     tlsphi_point pt;
-    tlsph_real H[9], push[3], Q[3];
+    tlsph_real H[9], slope[3], push[3], Q[3], heat[3];
     tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
     tlsphi_shrink(dim, pt.H, H);
-    tlsphi_multiply(dim, H, s->grad_theta + D * a, push);
+    tlsphi_row_get(s, s->rows.slope_theta, dim, a, slope);
+    tlsphi_multiply(dim, H, slope, push);
     tlsphi_multiply_transposed(dim, H, push, Q);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
         if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, Q);
-    const tlsph_real factor = -s->h_J[a] / s->theta[a];
+    const tlsph_real factor = -*tlsphi_at(s, s->rows.h_J, a) / *tlsphi_at(s, s->rows.theta, a);
     for (int i = 0; i < dim; i++) Q[i] *= factor;
-    if (s->M) tlsphi_multiply_transposed(dim, s->M + D * D * a, Q, s->heat + D * a);
-    else memcpy(s->heat + D * a, Q, D * sizeof *Q);
+    if (s->M) tlsphi_multiply_transposed(dim, s->M + (size_t)(dim * dim) * a, Q, heat);
+    tlsphi_row_put(s, s->rows.heat, dim, a, s->M ? heat : Q);
 }
 
-/* dJ/dt = H : grad v; the dissipation is added by the fluxes. */
+/* dJ/dt = H : grad v where grad v is not the raw sum's; the dissipation is added by the fluxes. */
 static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
     const size_t D = (size_t)s->dim;
     tlsphi_point pt;
@@ -3830,16 +4332,6 @@ static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
     s->rate_J[a] = tlsphi_dot(s->dim * s->dim, H, s->rate_F + D * D * a);
 }
 
-/* One instance with and without w, which most of the cost hangs on, and with and without scalars. */
-TLSPHI_INLINE void tlsphi_gradient_dispatch(const tlsph_solver *s, size_t a, const int dim, int with_w, int with_S,
-                                            int with_theta) {
-    switch ((with_w ? 2 : 0) + (with_S || with_theta ? 1 : 0)) {
-    case 0: tlsphi_gradient_particle(s, a, dim, 0, 0, 0); break;
-    case 1: tlsphi_gradient_particle(s, a, dim, 0, with_S, with_theta); break;
-    case 2: tlsphi_gradient_particle(s, a, dim, 1, 0, 0); break;
-    default: tlsphi_gradient_particle(s, a, dim, 1, with_S, with_theta); break;
-    }
-}
 /* The odd part of a vector across an image's mirror; the image's share in grad v (for w it is the same, because the rigid
    motion respects the mirrors) and, adjoint, in the force: (P_a + P_image) C/2 is the odd part of P C. The force comes
    after the projection: it is no internal one, the other half of the body exerts it. */
@@ -3847,7 +4339,7 @@ static void tlsphi_odd_part(const tlsphi_image *image, int dim, tlsph_real *v) {
     for (int i = 0; i < dim; i++)
         if ((i == image->axis) == (image->tangent != 0)) v[i] = 0;
 }
-static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *image, int with_w) {
+static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *image) {
     const size_t D = (size_t)s->dim, a = image->particle, axis = (size_t)image->axis;
     const tlsph_real factor = -image->c / s->V[a];
     tlsph_real odd[3] = {0, 0, 0};
@@ -3855,9 +4347,10 @@ static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *ima
     tlsphi_odd_part(image, s->dim, odd);
     for (size_t i = 0; i < D; i++) {
         const size_t at = D * D * a + D * i + axis;
+        const size_t row = (D * i + axis) * TLSPHI_ROW;
         s->grad_v[at] += factor * odd[i];
-        if (with_w) s->grad_w[at] += factor * odd[i];
-        if (s->rate_E) s->rate_E[a] += s->PM[at] * factor * odd[i];
+        tlsphi_at(s, s->rows.grad_w, a)[row] += factor * odd[i];
+        if (s->rate_E) s->rate_E[a] += tlsphi_at(s, s->rows.PM, a)[row] * factor * odd[i];
     }
 }
 static void tlsphi_image_forces(tlsph_solver *s) {
@@ -3865,7 +4358,8 @@ static void tlsphi_image_forces(tlsph_solver *s) {
     for (const tlsphi_image *image = s->image, *end = image + s->images; image != end; image++) {
         const size_t a = image->particle;
         tlsph_real force[3] = {0, 0, 0};
-        for (size_t i = 0; i < D; i++) force[i] = s->PM[D * D * a + D * i + (size_t)image->axis] * image->c / s->V[a];
+        const tlsph_real *PM = tlsphi_at(s, s->rows.PM, a);
+        for (size_t i = 0; i < D; i++) force[i] = PM[(D * i + (size_t)image->axis) * TLSPHI_ROW] * image->c / s->V[a];
         tlsphi_odd_part(image, s->dim, force);
         for (size_t i = 0; i < D; i++) s->rate_p[D * a + i] += force[i];
     }
@@ -3881,16 +4375,21 @@ static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
     return s->image + low;
 }
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
-    const int with_S = s->grad_S && s->damps, with_theta = s->heat_moves;
+    const int with_S = s->has_J && s->damps, with_theta = s->heat_moves;
     const int with_w = s->projection && (s->damps || s->rate_E); /* w and Sigma_J are there for the dissipation and E */
     const tlsphi_image *image = tlsphi_find_image(s, block->begin), *last = s->image + s->images;
+    for (size_t a = block->begin, tile = block->tile, end; a < block->end; a = end, tile++) {
+        end = tlsphi_tile_end(block, a);
+        if (s->dim == 3) tlsphi_gradient_tile(s, block, tile, a, end, 3, with_w, with_S, with_theta);
+        else tlsphi_gradient_tile(s, block, tile, a, end, 2, with_w, with_S, with_theta);
+    }
+    if (!s->rest && !s->mirrors && !s->images && !with_theta) return;
     for (size_t a = block->begin; a < block->end; a++) {
-        if (s->dim == 3) tlsphi_gradient_dispatch(s, a, 3, with_w, with_S, with_theta);
-        else tlsphi_gradient_dispatch(s, a, 2, with_w, with_S, with_theta);
+        const int mirrored = tlsphi_mirrors_of(s, a) != NULL, imaged = image != last && image->particle == a;
         if (s->rest) tlsphi_gradient_rest(s, a);
-        for (; image != last && image->particle == a; image++) tlsphi_image_gradient(s, image, with_w);
-        if (s->mirrors) tlsphi_mirror_gradients(s, a);
-        if (s->rate_J && !s->sharp) tlsphi_jacobian_rate(s, a);
+        for (; image != last && image->particle == a; image++) tlsphi_image_gradient(s, image);
+        if (mirrored) tlsphi_mirror_gradients(s, a);
+        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored)) tlsphi_jacobian_rate(s, a);
         if (with_theta) tlsphi_heat_flux(s, a);
     }
 }
@@ -3908,21 +4407,28 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
    number over TLSPHI_SHARP_STEP. At CFL 0.3 that is 0.067 > 0.048. */
 #define TLSPHI_SHARP_REACH 1.4 /* r */
 
-/* correction: sum_b ((g_b - g_a) d) (x) C_ab;  moment: sum_b ((P_a - P_b) C_ab) (x) d */
-TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
-                                     tlsph_real *correction, tlsph_real *moment) {
-    const size_t D = (size_t)dim, dd = D * D;
+/* correction: sum_b ((g_b - g_a) d) (x) C_ab;  moment: sum_b ((P_a - P_b) C_ab) (x) d;  relative: the first with grad w */
+TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int dim, tlsph_real *correction,
+                                     tlsph_real *relative, tlsph_real *moment) {
+    const size_t D = (size_t)dim;
+    const int dd = dim * dim;
+    tlsph_real P_a[9], w_a[9];
+    tlsphi_row_get(s, s->rows.PM, dd, a, P_a);
+    tlsphi_row_get(s, s->rows.grad_w, dd, a, w_a);
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
+        const tlsph_real *g_a = s->grad_v + (size_t)dd * a, *g_b = s->grad_v + (size_t)dd * b;
         tlsph_real d[3], change[9], jump[3];
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
-        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) change[i] =
-            grad[dd * b + (size_t)i] - grad[dd * a + (size_t)i];
+        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] = g_b[i] - g_a[i];
         tlsphi_multiply(dim, change, d, jump);
         tlsphi_add_outer(dim, correction, jump, s->g + D * k);
-        if (!moment) continue;
-        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) change[i] =
-            s->PM[dd * a + (size_t)i] - s->PM[dd * b + (size_t)i];
+        tlsphi_row_get(s, s->rows.grad_w, dd, b, change);
+        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] -= w_a[i];
+        tlsphi_multiply(dim, change, d, jump);
+        tlsphi_add_outer(dim, relative, jump, s->g + D * k);
+        tlsphi_row_get(s, s->rows.PM, dd, b, change);
+        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] = P_a[i] - change[i];
         tlsphi_multiply(dim, change, s->g + D * k, jump);
         tlsphi_add_outer(dim, moment, jump, d);
     }
@@ -3934,20 +4440,22 @@ static void tlsphi_mirror_all(const tlsph_solver *s, size_t a, tlsph_real *G) {
 TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int dim) {
     const size_t dd = (size_t)(dim * dim);
     const tlsph_real sixth = 1 / (6 * s->V[a]), reach = sixth * TLSPHI_R(TLSPHI_SHARP_REACH);
-    tlsph_real correction[9] = {0}, moment[9] = {0}, relative[9] = {0};
-    tlsphi_sharp_sums(s, a, dim, s->grad_v, correction, moment);
-    if (s->projection && (s->damps || s->rate_E)) tlsphi_sharp_sums(s, a, dim, s->grad_w, relative, NULL);
-    else memcpy(relative, correction, sizeof relative);
+    tlsph_real correction[9] = {0}, moment[9] = {0}, relative[9] = {0}, P[9], slope[9];
+    tlsphi_sharp_sums(s, a, dim, correction, relative, moment);
     tlsphi_mirror_all(s, a, correction);
     tlsphi_mirror_all(s, a, relative);
     tlsphi_mirror_all(s, a, moment);
+    tlsphi_row_get(s, s->rows.PM, (int)dd, a, P);
+    tlsphi_row_get(s, s->rows.grad_w, (int)dd, a, slope);
+    if (s->rate_E) s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, P, relative);
     for (size_t i = 0; i < dd; i++) {
         s->rate_F[dd * a + i] = s->grad_v[dd * a + i] - sixth * correction[i];
-        s->slope_w[dd * a + i] = s->grad_w[dd * a + i] - reach * relative[i];
-        s->P_flux[dd * a + i] = s->PM[dd * a + i] + sixth * moment[i];
+        slope[i] -= reach * relative[i];
+        P[i] += sixth * moment[i];
     }
+    tlsphi_row_put(s, s->rows.slope_w, (int)dd, a, slope);
+    tlsphi_row_put(s, s->rows.P, (int)dd, a, P);
     if (s->rate_J) tlsphi_jacobian_rate(s, a);
-    if (s->rate_E) s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, s->PM + dd * a, relative);
 }
 static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
     for (size_t a = block->begin; a < block->end; a++) {
@@ -3991,27 +4499,33 @@ static void tlsphi_laplacian_lean(const tlsph_solver *s, size_t a, tlsph_real le
     memcpy(turned, lean, 3 * sizeof *lean);
     if (s->M) tlsphi_multiply_transposed(s->dim, s->M + D * D * a, lean, turned);
 }
+/* rho w of b less that of a */
+static void tlsphi_momentum_jump(const tlsph_solver *s, size_t a, size_t b, tlsph_real *jump) {
+    const tlsph_real *w_a = tlsphi_at(s, s->rows.w, a), *w_b = tlsphi_at(s, s->rows.w, b);
+    const tlsph_real rho_a = tlsphi_material_of(s, a)->rho, rho_b = tlsphi_material_of(s, b)->rho;
+    for (size_t i = 0; i < (size_t)s->dim; i++) jump[i] = rho_b * w_b[i * TLSPHI_ROW] - rho_a * w_a[i * TLSPHI_ROW];
+}
 static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
     for (size_t a = block->begin; a < block->end; a++) {
         const tlsph_real *lean = s->lean + 2 * D * a;
-        tlsph_real sum[3] = {0, 0, 0};
+        tlsph_real sum[3] = {0, 0, 0}, jump[3];
         for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
             const size_t b = s->neighbour[k];
             tlsph_real L = s->laplacian[k] / s->V[a] - tlsphi_dot(s->dim, lean, s->g + D * k);
             if (s->rest) L -= tlsphi_dot(s->dim, lean + D, s->rest + D * k);
-            for (size_t i = 0; i < D; i++)
-                sum[i] += L * (s->wave[4 * b + 2] * s->w[D * b + i] - s->wave[4 * a + 2] * s->w[D * a + i]);
+            tlsphi_momentum_jump(s, a, b, jump);
+            for (size_t i = 0; i < D; i++) sum[i] += L * jump[i];
         }
-        for (size_t i = 0; i < D; i++) s->lap_p[D * a + i] = sum[i];
+        tlsphi_row_put(s, s->rows.lap_p, s->dim, a, sum);
     }
 }
 /* ==== [FLUXES] =====================================================================================================
    One gather over the neighbours: stress, numerical dissipation and heat. The power of the stresses needs no pairs: the
    flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
-   is conserved to round-off because force and gradient are adjoint. The dimension, J, the thermal unknown
-   and `plain` (default dissipation, antisymmetric C, no audit) are constants of each instance below, so that the pair
-   loop has no branch that could be decided beforehand. */
+   is conserved to round-off because force and gradient are adjoint. The physics of a pair is written once, for two sides
+   that were loaded from the rows, and stands in two loops: over the lanes of a tile (the default dissipation), and over the
+   pairs of a particle (all else; with `audit` also the default, which is how tests compare the two). */
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
 typedef struct tlsphi_gathered {
@@ -4019,93 +4533,126 @@ typedef struct tlsphi_gathered {
     double least;
 } tlsphi_gathered;
 
-/* (002-28) for one pair. */
-static void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, tlsphi_gathered *sum,
-                            tlsph_real *production) {
-    const size_t D = (size_t)s->dim;
-    const tlsph_real c = (tlsphi_material_of(s, a)->c_linear + tlsphi_material_of(s, b)->c_linear) / 2;
-    const tlsph_real l = s->laplacian[k] * c, eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
-    tlsph_real D_p[3] = {0}, Dw[3] = {0};
-    for (size_t i = 0; i < D; i++) {
-        Dw[i] = s->w[D * b + i] - s->w[D * a + i];
-        D_p[i] = l * (eta2 * (s->wave[4 * b + 2] * s->w[D * b + i] - s->wave[4 * a + 2] * s->w[D * a + i]) -
-                      eta4 * (s->lap_p[D * b + i] - s->lap_p[D * a + i]));
-        sum->T[i] += D_p[i];
-    }
-    *production = tlsphi_dot(s->dim, Dw, D_p);
-    if (s->thermal == TLSPH_ENERGY) sum->heat += *production / 2;
+/* One side of a pair, as dissipation and heat see it. */
+typedef struct tlsphi_damp_side {
+    tlsph_real w[3], X[3], A[9], slope_w[9], c_p, c_s, rho, ratio, S, slope_S[3];
+} tlsphi_damp_side;
+typedef struct tlsphi_heat_side {
+    tlsph_real X[3], A[9], theta, slope[3], heat[3], h_J;
+} tlsphi_heat_side;
+
+/* at: the particle's place in row 0 */
+TLSPHI_INLINE void tlsphi_load_side(const tlsphi_rows *r, const tlsph_real *at, const int dim, const int with_J,
+                                    tlsphi_damp_side *out) {
+    tlsphi_take_rows(dim, at + r->w * TLSPHI_ROW, out->w);
+    tlsphi_take_rows(dim, at + r->X * TLSPHI_ROW, out->X);
+    tlsphi_take_rows(dim * dim, at + r->A * TLSPHI_ROW, out->A);
+    tlsphi_take_rows(dim * dim, at + r->slope_w * TLSPHI_ROW, out->slope_w);
+    out->c_p = at[(r->wave + 0) * TLSPHI_ROW];
+    out->c_s = at[(r->wave + 1) * TLSPHI_ROW];
+    out->rho = at[(r->wave + 2) * TLSPHI_ROW];
+    out->ratio = at[(r->wave + 3) * TLSPHI_ROW];
+    out->S = 0;
+    if (!with_J) return;
+    out->S = at[r->S * TLSPHI_ROW];
+    tlsphi_take_rows(dim, at + r->slope_S * TLSPHI_ROW, out->slope_S);
 }
-/* Fluxes of the default forms for one pair. dim, with_J, thermal are constants after inlining. */
-TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C,
-                                         const tlsph_real *c, const int dim, const int with_J, const int thermal,
-                                         const int kind, tlsphi_gathered *sum, tlsph_real *production) {
-    const size_t D = (size_t)dim, dd = D * D;
-    const tlsph_real *w_a = s->wave + 4 * a, *w_b = s->wave + 4 * b, *v_a = s->w + D * a, *v_b = s->w + D * b;
-    const tlsph_real cc = tlsphi_max(tlsphi_dot(dim, c, c), TLSPHI_TINY), inverse = 1 / tlsphi_sqrt(cc);
-    const tlsph_real CC = tlsphi_sqrt(tlsphi_max(tlsphi_dot(dim, C, C), TLSPHI_TINY));
-    const tlsph_real rho = (w_a[2] + w_b[2]) / 2, share = s->metal ? cc * inverse / (2 * CC) : TLSPHI_R(0.5);
-    const tlsph_real c_p = (w_a[0] + w_b[0]) * share, c_s = (w_a[1] + w_b[1]) * share;
-    tlsph_real n[3], d[3], Dv[3], Dr[3], D_p[3], D_J = 0, DS = 0;
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
-        n[i] = c[i] * inverse;
-        d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
-        Dv[i] = v_b[i] - v_a[i];
-    }
-    tlsphi_multiply_mean(dim, s->slope_w + dd * a, s->slope_w + dd * b, d, Dr);
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) Dr[i] = Dv[i] - Dr[i];
-    const tlsph_real raw = tlsphi_dot(dim, n, Dv);
-    tlsph_real front = 0;
-    if (kind == TLSPH_LIMITED && raw < -TLSPHI_R(TLSPHI_FRONT_LOW) * c_p && !s->metal) {
-        tlsph_real Gd_a[3], Gd_b[3];
-        tlsphi_multiply(dim, s->grad_w + dd * a, d, Gd_a);
-        tlsphi_multiply(dim, s->grad_w + dd * b, d, Gd_b);
-        front = tlsphi_front(raw, tlsphi_dot(dim, n, Gd_a), tlsphi_dot(dim, n, Gd_b), c_p);
-    }
-    tlsphi_damp_velocity(dim, kind, Dv, Dr, n, front, tlsphi_pair_density(w_a[2], w_b[2]) * CC / 2, c_p, c_s, D_p);
-    if (with_J) {
-        DS = s->S[b] - s->S[a];
-        const tlsph_real slope = (tlsphi_dot(dim, s->grad_S + D * a, d) + tlsphi_dot(dim, s->grad_S + D * b, d)) / 2;
-        D_J = tlsphi_jacobian_factor(s->jump_share, cc, CC, rho, c_p, (w_a[3] + w_b[3]) / 2) *
-              tlsphi_damped_jump(kind, DS, DS - slope, front);
-        sum->J += D_J;
-    }
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += D_p[i];
-    *production = tlsphi_dot(dim, Dv, D_p) + DS * D_J;
-    if (thermal == TLSPH_ENERGY) sum->heat += *production / 2 + (with_J ? s->S[a] * D_J : 0); /* D_E - v_a.D_p */
+TLSPHI_INLINE void tlsphi_load_heat(const tlsphi_rows *r, const tlsph_real *at, const int dim, tlsphi_heat_side *out) {
+    tlsphi_take_rows(dim, at + r->X * TLSPHI_ROW, out->X);
+    tlsphi_take_rows(dim * dim, at + r->A * TLSPHI_ROW, out->A);
+    tlsphi_take_rows(dim, at + r->slope_theta * TLSPHI_ROW, out->slope);
+    tlsphi_take_rows(dim, at + r->heat * TLSPHI_ROW, out->heat);
+    out->theta = at[r->theta * TLSPHI_ROW];
+    out->h_J = at[r->h_J * TLSPHI_ROW];
 }
 
-/* The printed form in the same place; slow and seldom used, so it goes through the public function. */
-static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *C, const tlsph_real *c,
-                                tlsphi_gathered *sum, tlsph_real *production) {
+/* (002-28) for one pair. */
+static void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, tlsph_real *D_p) {
+    const tlsph_real c = (tlsphi_material_of(s, a)->c_linear + tlsphi_material_of(s, b)->c_linear) / 2;
+    const tlsph_real l = s->laplacian[k] * c, eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
+    const tlsph_real *lap_a = tlsphi_at(s, s->rows.lap_p, a), *lap_b = tlsphi_at(s, s->rows.lap_p, b);
+    tlsph_real jump[3];
+    tlsphi_momentum_jump(s, a, b, jump);
+    for (size_t i = 0; i < (size_t)s->dim; i++)
+        D_p[i] = l * (eta2 * jump[i] - eta4 * (lap_b[i * TLSPHI_ROW] - lap_a[i * TLSPHI_ROW]));
+}
+/* What a pair dissipates: the fluxes, their production, and whether it might be a front. */
+typedef struct tlsphi_damping {
+    tlsph_real D_p[3], D_J, production, approaches;
+} tlsphi_damping;
+
+/* Default forms for one pair: g and |C| of the pair. dim, with_J, with_front, kind are constants after inlining. Without
+   with_front the fluxes are those away from fronts, and `approaches` tells whether that must be looked at again. */
+TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsphi_damp_side *a, const tlsphi_damp_side *b, const tlsph_real *g, tlsph_real CC,
+                                         const int dim, const int with_J, const int with_front, const int kind,
+                                         const int metal, tlsph_real jump_share, tlsphi_damping *out) {
+    tlsph_real c[3] = {0}, d[3] = {0}, Dv[3], Dr[3], Gd_a[3], Gd_b[3], front = 0;
+    tlsphi_multiply_mean(dim, a->A, b->A, g, c);
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = b->X[i] - a->X[i];
+    tlsphi_multiply(dim, a->slope_w, d, Gd_a);
+    tlsphi_multiply(dim, b->slope_w, d, Gd_b);
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
+        Dv[i] = b->w[i] - a->w[i];
+        Dr[i] = Dv[i] - (Gd_a[i] + Gd_b[i]) / 2;
+    }
+    const tlsph_real cc = tlsphi_dot(dim, c, c), inverse = 1 / (cc + TLSPHI_TINY);
+    const tlsph_real rho = (a->rho + b->rho) / 2, share = metal ? tlsphi_square_root(cc) / (2 * CC) : TLSPHI_R(0.5);
+    const tlsph_real c_p = (a->c_p + b->c_p) * share, c_s = (a->c_s + b->c_s) * share;
+    const tlsph_real raw = tlsphi_dot(dim, c, Dv), low = TLSPHI_R(TLSPHI_FRONT_LOW) * c_p;
+    out->approaches = raw < 0 && raw * raw > low * low * cc && !metal ? TLSPHI_R(1) : TLSPHI_R(0);
+    if (kind == TLSPH_LIMITED && with_front && !metal) {
+        const tlsph_real per = tlsphi_inverse_root(cc);
+        front = tlsphi_front(raw * per, tlsphi_dot(dim, c, Gd_a) * per, tlsphi_dot(dim, c, Gd_b) * per, c_p);
+    }
+    tlsphi_damp_velocity(dim, kind, Dv, Dr, c, inverse, front, tlsphi_pair_density(a->rho, b->rho) * CC / 2, c_p, c_s,
+                         out->D_p);
+    out->production = tlsphi_dot(dim, Dv, out->D_p);
+    out->D_J = 0;
+    if (!with_J) return;
+    const tlsph_real DS = b->S - a->S, slope = (tlsphi_dot(dim, a->slope_S, d) + tlsphi_dot(dim, b->slope_S, d)) / 2;
+    out->D_J = tlsphi_jacobian_factor(jump_share, cc, CC, rho, c_p, (a->ratio + b->ratio) / 2) *
+               tlsphi_damped_jump(kind, DS, DS - slope, front);
+    out->production += DS * out->D_J;
+}
+
+/* The printed form in the same place; slow and seldom used, so it goes through the public function. `heat` is what the
+   particle a gets beside half of the production. */
+static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const tlsphi_damp_side *side_a,
+                                const tlsphi_damp_side *side_b, const tlsph_real *C, const tlsph_real *c,
+                                tlsphi_damping *out, tlsph_real *heat) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, index[2] = {a, b};
-    const tlsph_real *velocity = s->thermal == TLSPH_ENERGY ? s->v : s->w; /* (66) has the rigid motion in it, (72) not */
+    const tlsphi_damp_side *given[2] = {side_a, side_b};
     tlsph_pair_side side[2];
     tlsph_pair_flux flux;
     tlsph_real C3[3] = {0}, c3[3] = {0}, d[3] = {0};
     memset(side, 0, sizeof side);
     for (int i = 0; i < 2; i++) {
         const size_t q = index[i];
-        side[i].theta_R = tlsphi_material_of(s, q)->theta_R;
-        side[i].theta = s->thermal == TLSPH_ENERGY ? s->theta[q] : side[i].theta_R; /* eta form and isothermal: (72) */
-        side[i].c_p = s->wave[4 * q];
-        side[i].c_s = s->wave[4 * q + 1];
-        side[i].density = s->wave[4 * q + 2];
-        side[i].drift_ratio = s->wave[4 * q + 3];
-        if (s->S) side[i].Sigma_J = s->S[q];
-        for (int k = 0; k < dim; k++) side[i].velocity[k] = velocity[D * q + (size_t)k];
+        side[i].theta_R = tlsphi_material_of(s, q)->theta_R; /* eta form and isothermal: (72) */
+        side[i].theta = s->thermal == TLSPH_ENERGY ? *tlsphi_at(s, s->rows.theta, q) : side[i].theta_R;
+        side[i].c_p = given[i]->c_p;
+        side[i].c_s = given[i]->c_s;
+        side[i].density = given[i]->rho;
+        side[i].drift_ratio = given[i]->ratio;
+        side[i].Sigma_J = given[i]->S;
+        for (int k = 0; k < dim; k++) /* (66) has the rigid motion in it, (72) not */
+            side[i].velocity[k] = s->thermal == TLSPH_ENERGY ? s->v[D * q + (size_t)k] : given[i]->w[k];
     }
     for (int k = 0; k < dim; k++) {
         C3[k] = C[k];
         c3[k] = c[k];
     }
     tlsph_pair_dissipation(s->thermal == TLSPH_ENERGY ? TLSPH_AS_PRINTED : TLSPH_FIRST_ORDER, &side[0], &side[1], C3,
-                           c3, d, s->S ? s->jump_share : 0, &flux);
-    for (int k = 0; k < dim; k++) sum->T[k] += flux.D_p[k];
-    sum->J += flux.D_J;
-    /* D_p works on w in the end, because the projection takes its resultant and torque away */
-    if (s->thermal == TLSPH_ENERGY) sum->heat += flux.D_E - tlsphi_dot(dim, s->w + D * a, flux.D_p);
-    *production = flux.production;
+                           c3, d, s->has_J ? s->jump_share : 0, &flux);
+    for (int k = 0; k < dim; k++) out->D_p[k] = flux.D_p[k];
+    out->D_J = flux.D_J;
+    out->production = flux.production;
+    /* D_p works on w in the end, because the projection takes its resultant and torque away; half of the production and
+       S_a D_J are added for all forms alike */
+    *heat = s->thermal == TLSPH_ENERGY ? flux.D_E - tlsphi_dot(dim, side_a->w, flux.D_p) - flux.production / 2 -
+                                             side_a->S * flux.D_J
+                                       : 0;
 }
 
 /* Heat of one pair. The double-gradient flux of (54e), (57), whose production is Q.grad theta/theta^2 exactly, and in
@@ -4115,116 +4662,274 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
    on lattices h/J |c|^2/(C.d), which is unbounded in clouds, where C may be nearly perpendicular to d.
    Where one neighbour is more than twice as hot as the other, the products Q_a theta_b/theta_a of the double gradient are
    larger than any flux, and unstable; there the two-point flux stands alone. */
-TLSPHI_INLINE void tlsphi_pair_heat(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g, const tlsph_real *C,
-                                    const tlsph_real *rest, const int dim, const int thermal, tlsphi_gathered *sum) {
-    const size_t D = (size_t)dim, dd = D * D;
-    tlsph_real q_a = tlsphi_dot(dim, s->heat + D * a, g), q_b = tlsphi_dot(dim, s->heat + D * b, g);
+typedef struct tlsphi_pair_of_heat {
+    tlsph_real heat, source, conduction;
+} tlsphi_pair_of_heat;
+
+TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat_side *b, const tlsph_real *g,
+                                    const tlsph_real *C, const tlsph_real *rest, const int dim, int thermal,
+                                    const int compact, tlsphi_pair_of_heat *out) {
+    tlsph_real q_a = tlsphi_dot(dim, a->heat, g), q_b = tlsphi_dot(dim, b->heat, g);
     if (rest) {
-        q_a += tlsphi_dot(dim, s->heat + D * a, rest);
-        q_b -= tlsphi_dot(dim, s->heat + D * b, rest);
+        q_a += tlsphi_dot(dim, a->heat, rest);
+        q_b -= tlsphi_dot(dim, b->heat, rest);
     }
-    const tlsph_real theta_a = s->theta[a], theta_b = s->theta[b], D_theta = theta_b - theta_a;
-    const int compact = s->conduction == TLSPH_COMPACT, front = compact && tlsphi_abs(D_theta) > tlsphi_min(theta_a, theta_b);
-    if (!front) {
-        sum->source -= q_a * D_theta;
-        if (thermal == TLSPH_ENERGY) sum->heat -= (q_a * theta_b + q_b * theta_a) / 2;
-        else sum->heat -= (q_a + q_b) / 2;
-    }
+    const tlsph_real D_theta = b->theta - a->theta, one = 1;
+    const int front = compact && (D_theta > a->theta || -D_theta > b->theta);
+    q_a = front ? 0 : q_a;
+    q_b = front ? 0 : q_b;
+    out->source = -q_a * D_theta;
+    out->heat = -(q_a * (thermal == TLSPH_ENERGY ? b->theta : one) + q_b * (thermal == TLSPH_ENERGY ? a->theta : one)) / 2;
+    out->conduction = 0;
     if (!compact) return;
-    tlsph_real d[3], c_a[3], c_b[3];
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
-    const tlsph_real Cd = tlsphi_dot(dim, C, d);
-    const tlsph_real slope =
-        (tlsphi_dot(dim, s->grad_theta + D * a, d) + tlsphi_dot(dim, s->grad_theta + D * b, d)) / 2;
-    const tlsph_real jump = front ? D_theta : tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0);
-    if (!(Cd > 0)) return;
-    tlsphi_multiply(dim, s->A + dd * a, g, c_a);
-    tlsphi_multiply(dim, s->A + dd * b, g, c_b);
-    const tlsph_real k = (s->h_J[a] * tlsphi_dot(dim, c_a, c_a) + s->h_J[b] * tlsphi_dot(dim, c_b, c_b)) * Cd /
-                         (2 * tlsphi_max(tlsphi_dot(dim, C, C), TLSPHI_TINY) * tlsphi_dot(dim, d, d));
+    tlsph_real d[3] = {0}, c_a[3] = {0}, c_b[3] = {0};
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = b->X[i] - a->X[i];
+    const tlsph_real Cd = tlsphi_max(tlsphi_dot(dim, C, d), 0);
+    const tlsph_real slope = (tlsphi_dot(dim, a->slope, d) + tlsphi_dot(dim, b->slope, d)) / 2;
+    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = front ? D_theta : limited;
+    tlsphi_multiply(dim, a->A, g, c_a);
+    tlsphi_multiply(dim, b->A, g, c_b);
+    const tlsph_real k = (a->h_J * tlsphi_dot(dim, c_a, c_a) + b->h_J * tlsphi_dot(dim, c_b, c_b)) * Cd /
+                         (2 * tlsphi_dot(dim, C, C) * tlsphi_dot(dim, d, d) + TLSPHI_TINY);
     const tlsph_real into = k * jump;
-    sum->heat += thermal == TLSPH_ENERGY ? into : into / theta_a;
-    sum->conduction += into * D_theta / (2 * theta_a * theta_b);
+    out->heat += into / (thermal == TLSPH_ENERGY ? one : a->theta);
+    out->conduction = into * D_theta / (2 * a->theta * b->theta + TLSPHI_TINY);
 }
 
 /* Audit: the pair's production over the size of its terms must not be negative beyond round-off. */
-static double tlsphi_audit(const tlsph_solver *s, size_t a, size_t b, const tlsphi_gathered *before,
-                           const tlsphi_gathered *after, tlsph_real production) {
-    const size_t D = (size_t)s->dim;
-    double size = s->S ? fabs((double)(s->S[b] - s->S[a]) * (double)(after->J - before->J)) : 0;
-    for (size_t i = 0; i < D; i++)
-        size += fabs((double)(s->w[D * b + i] - s->w[D * a + i]) * (double)(after->T[i] - before->T[i]));
-    return size > 0 ? (double)production / size : 0;
+static double tlsphi_audit(int dim, const tlsphi_damp_side *a, const tlsphi_damp_side *b, const tlsphi_damping *flux) {
+    double size = fabs((double)(b->S - a->S) * (double)flux->D_J);
+    for (int i = 0; i < dim; i++) size += fabs((double)(b->w[i] - a->w[i]) * (double)flux->D_p[i]);
+    return size > 0 ? (double)flux->production / size : 0;
 }
 
-/* parts: a constant, TLSPHI_STRESSES (and heat) or TLSPHI_DAMPING or both; apart only where the dissipation is frozen or
-   has pairs of its own. */
+/* -- the pairs of a particle, one by one -- */
+
+/* Stresses, and heat, of one pair. */
+TLSPHI_INLINE void tlsphi_add_stress(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *C, const int dim,
+                                     tlsphi_gathered *sum) {
+    const int dd = dim * dim;
+    const size_t b = s->neighbour[k], D = (size_t)dim;
+    const tlsph_real *g = s->g + D * k, *rest = s->rest && s->force_form == TLSPH_ADJOINT ? s->rest + D * k : NULL;
+    tlsph_real P_a[9], P_b[9], t[3];
+    tlsphi_row_get(s, s->rows.P, dd, a, P_a);
+    tlsphi_row_get(s, s->rows.P, dd, b, P_b);
+    tlsphi_multiply_mean(dim, P_a, P_b, g, t); /* (P_a C_ab - P_b C_ba)/2 */
+    for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+    if (rest) { /* (P_a - P_b) r_ab / 2 */
+        for (int i = 0; i < dd; i++) P_a[i] = (P_a[i] - P_b[i]) / 2;
+        tlsphi_multiply(dim, P_a, rest, t);
+        for (int i = 0; i < dim; i++) sum->T[i] += t[i];
+    }
+    if (!s->heat_moves) return;
+    tlsphi_heat_side side_a, side_b;
+    tlsphi_pair_of_heat heat;
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), dim, &side_a);
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), dim, &side_b);
+    tlsphi_pair_heat(&side_a, &side_b, g, C, rest, dim, s->thermal, s->conduction == TLSPH_COMPACT, &heat);
+    sum->heat += heat.heat;
+    sum->source += heat.source;
+    sum->conduction += heat.conduction;
+}
+/* Dissipation of the pair k of s->g, or of s->damped_g. */
+TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t b, size_t k, const tlsph_real *g,
+                                         const tlsph_real *C, const int dim, tlsphi_gathered *sum) {
+    tlsphi_damp_side side_a, side_b;
+    tlsphi_damping flux;
+    tlsph_real heat = 0, c[3];
+    memset(&flux, 0, sizeof flux);
+    tlsphi_load_side(&s->rows, tlsphi_at(s, 0, a), dim, s->has_J, &side_a);
+    tlsphi_load_side(&s->rows, tlsphi_at(s, 0, b), dim, s->has_J, &side_b);
+    if (s->dissipation == TLSPH_AS_PRINTED) {
+        tlsphi_multiply_mean(dim, side_a.A, side_b.A, g, c);
+        tlsphi_pair_printed(s, a, b, &side_a, &side_b, C, c, &flux, &heat);
+    } else if (s->dissipation == TLSPH_JST) {
+        tlsphi_pair_jst(s, a, b, k, flux.D_p);
+        for (int i = 0; i < dim; i++) flux.production += (side_b.w[i] - side_a.w[i]) * flux.D_p[i];
+    } else {
+        const tlsph_real CC = tlsphi_sqrt(tlsphi_dot(dim, C, C));
+        tlsphi_pair_dissipate(&side_a, &side_b, g, CC, dim, s->has_J, 1, (int)s->dissipation, s->metal, s->jump_share,
+                              &flux);
+    }
+    for (int i = 0; i < dim; i++) sum->T[i] += flux.D_p[i];
+    sum->J += flux.D_J;
+    sum->heat += heat;
+    sum->production += flux.production;
+    if (s->audit) sum->least = tlsphi_dmin(sum->least, tlsphi_audit(dim, &side_a, &side_b, &flux));
+}
+/* parts: TLSPHI_STRESSES (and heat) or TLSPHI_DAMPING or both; apart only where the dissipation is frozen or has pairs of
+   its own. */
 enum { TLSPHI_STRESSES = 1, TLSPHI_DAMPING = 2, TLSPHI_BOTH = 3 };
-TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, const int dim, const int with_J,
-                                     const int thermal, const int plain, const int parts, tlsphi_gathered *sum) {
+TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, int parts, const int dim, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, dd = D * D, *first = parts == TLSPHI_DAMPING ? s->damped_first : s->first;
     const uint32_t *neighbour = parts == TLSPHI_DAMPING ? s->damped_neighbour : s->neighbour;
     const tlsph_real *vectors = parts == TLSPHI_DAMPING ? s->damped_g : s->g;
+    if (s->dissipation == TLSPH_NO_DISSIPATION) parts &= TLSPHI_STRESSES;
     for (size_t k = first[a]; k < first[a + 1]; k++) {
         const size_t b = neighbour[k];
-        const tlsph_real *g = vectors + D * k, *C = g;
-        tlsph_real t[3], c[3], skew[3], production = 0;
-        if (!plain && s->M) {
-            tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
-            C = skew;
-        }
-        const tlsph_real *rest = NULL;
-        if (!plain && s->rest && s->force_form == TLSPH_ADJOINT) rest = s->rest + D * k;
-        if (parts & TLSPHI_STRESSES) {
-            tlsphi_multiply_mean(dim, s->P_flux + dd * a, s->P_flux + dd * b, g, t); /* (P_a C_ab - P_b C_ba)/2 */
-            TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += t[i];
-            if (rest) { /* (P_a - P_b) r_ab / 2 */
-                tlsph_real P[9];
-                for (size_t i = 0; i < dd; i++) P[i] = (s->P_flux[dd * a + i] - s->P_flux[dd * b + i]) / 2;
-                tlsphi_multiply(dim, P, rest, t);
-                for (int i = 0; i < dim; i++) sum->T[i] += t[i];
-            }
-            if (thermal && s->heat_moves) tlsphi_pair_heat(s, a, b, g, C, rest, dim, thermal, sum);
-        }
-        if (!(parts & TLSPHI_DAMPING)) continue;
-        if (plain) {
-            tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
-            tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, TLSPH_LIMITED, sum, &production);
-        } else if (s->dissipation != TLSPH_NO_DISSIPATION) {
-            tlsphi_gathered before;
-            if (s->audit) before = *sum;
-            tlsphi_multiply_mean(dim, s->A + dd * a, s->A + dd * b, g, c);
-            if (s->dissipation == TLSPH_AS_PRINTED) tlsphi_pair_printed(s, a, b, C, c, sum, &production);
-            else if (s->dissipation == TLSPH_JST) tlsphi_pair_jst(s, a, b, k, sum, &production);
-            else tlsphi_pair_dissipate(s, a, b, C, c, dim, with_J, thermal, (int)s->dissipation, sum, &production);
-            if (s->audit) sum->least = tlsphi_dmin(sum->least, tlsphi_audit(s, a, b, &before, sum, production));
-        }
-        sum->production += production;
+        const tlsph_real *g = vectors + D * k;
+        tlsph_real C[3];
+        if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, C);
+        else memcpy(C, g, D * sizeof *C);
+        if (parts & TLSPHI_STRESSES) tlsphi_add_stress(s, a, k, C, dim, sum);
+        if (parts & TLSPHI_DAMPING) tlsphi_add_damping_of(s, a, b, k, g, C, dim, sum);
     }
 }
 
-TLSPHI_INLINE void tlsphi_add_gathered(tlsphi_gathered *sum, const tlsphi_gathered *more) {
+static void tlsphi_flux_one_by_one(const tlsph_solver *s, size_t begin, size_t end, int parts, tlsphi_gathered *out) {
+    for (size_t a = begin; a < end; a++) {
+        if (s->dim == 3) tlsphi_flux_pairs(s, a, parts, 3, out + (a - begin));
+        else tlsphi_flux_pairs(s, a, parts, 2, out + (a - begin));
+    }
+}
+
+/* -- the pairs of a tile, slot by slot -- */
+
+typedef struct tlsphi_lane_sums {
+    tlsph_real T[3 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST], production[TLSPHI_LANES_MOST];
+    tlsph_real heat[TLSPHI_LANES_MOST], source[TLSPHI_LANES_MOST], conduction[TLSPHI_LANES_MOST];
+} tlsphi_lane_sums;
+
+TLSPHI_INLINE void tlsphi_stress_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                       const tlsph_real *pattern, const int dim, tlsphi_lane_sums *sum) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real P_a[9], P_b[9], g[3], t[3];
+        tlsphi_take_rows(dim * dim, a + r->P * TLSPHI_ROW + l, P_a);
+        tlsphi_take_rows(dim * dim, b + r->P * TLSPHI_ROW + l, P_b);
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_multiply_mean(dim, P_a, P_b, g, t);
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[(size_t)i * TLSPHI_LANES + l] += t[i];
+    }
+}
+TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                     const tlsph_real *pattern, const int dim, int thermal, const int compact,
+                                     tlsphi_lane_sums *sum) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsphi_heat_side side_a, side_b;
+        tlsphi_pair_of_heat heat;
+        tlsph_real g[3];
+        tlsphi_load_heat(r, a + l, dim, &side_a);
+        tlsphi_load_heat(r, b + l, dim, &side_b);
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_pair_heat(&side_a, &side_b, g, g, NULL, dim, thermal, compact, &heat);
+        sum->heat[l] += heat.heat;
+        sum->source[l] += heat.source;
+        sum->conduction[l] += heat.conduction;
+    }
+}
+/* Writes the dissipation of a slot to `out` (T, J, production); returns whether a lane might be a front. */
+TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                    const tlsph_real *pattern, const int dim, const int with_J, const int with_front,
+                                    tlsph_real jump_share, tlsphi_lane_sums *out) {
+    tlsph_real approaches[TLSPHI_LANES_MOST], any = 0;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsphi_damp_side side_a, side_b;
+        tlsphi_damping flux;
+        tlsph_real g[3];
+        tlsphi_load_side(r, a + l, dim, with_J, &side_a);
+        tlsphi_load_side(r, b + l, dim, with_J, &side_b);
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_pair_dissipate(&side_a, &side_b, g, pattern[(size_t)dim * TLSPHI_LANES + l], dim, with_J, with_front,
+                              TLSPH_LIMITED, 0, jump_share, &flux);
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) out->T[(size_t)i * TLSPHI_LANES + l] = flux.D_p[i];
+        out->J[l] = flux.D_J;
+        out->production[l] = flux.production;
+        approaches[l] = flux.approaches;
+    }
+    for (size_t l = 0; l < TLSPHI_LANES; l++) any += approaches[l];
+    return any > 0;
+}
+TLSPHI_INLINE void tlsphi_add_lanes(const int dim, const tlsphi_lane_sums *flux, tlsphi_lane_sums *sum) {
+    for (size_t i = 0; i < (size_t)dim * TLSPHI_LANES; i++) sum->T[i] += flux->T[i];
+    for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        sum->J[l] += flux->J[l];
+        sum->production[l] += flux->production[l];
+    }
+}
+TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
+                                     const int dim, const int with_J, int parts, tlsphi_lane_sums *sum) {
+    const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
+    const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
+    const tlsph_real *a = tlsphi_at(s, 0, base);
+    const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const tlsphi_slot *slot = graph->slot + k;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)(dim + 1) * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, r.w, rows);
+        if (parts & TLSPHI_STRESSES) tlsphi_stress_lanes(&r, a, b, g, dim, sum);
+        if (heats && s->conduction == TLSPH_COMPACT) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, sum);
+        else if (heats) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 0, sum);
+        if (parts & TLSPHI_DAMPING) {
+            tlsphi_lane_sums flux;
+            if (tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 0, s->jump_share, &flux))
+                tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 1, s->jump_share, &flux);
+            tlsphi_add_lanes(dim, &flux, sum);
+        }
+    }
+}
+static void tlsphi_flux_slots_20(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
+                                 tlsphi_lane_sums *sum) {
+    tlsphi_flux_slots(s, block, tile, base, 2, 0, parts, sum);
+}
+static void tlsphi_flux_slots_21(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
+                                 tlsphi_lane_sums *sum) {
+    tlsphi_flux_slots(s, block, tile, base, 2, 1, parts, sum);
+}
+static void tlsphi_flux_slots_30(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
+                                 tlsphi_lane_sums *sum) {
+    tlsphi_flux_slots(s, block, tile, base, 3, 0, parts, sum);
+}
+static void tlsphi_flux_slots_31(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
+                                 tlsphi_lane_sums *sum) {
+    tlsphi_flux_slots(s, block, tile, base, 3, 1, parts, sum);
+}
+/* Sums of the particles of a tile. */
+static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin, size_t end,
+                             int parts, tlsphi_gathered *out) {
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, D = (size_t)s->dim;
+    tlsphi_lane_sums sum;
+    memset(&sum, 0, sizeof sum);
+    if (s->dim == 3 && s->has_J) tlsphi_flux_slots_31(s, block, tile, base, parts, &sum);
+    else if (s->dim == 3) tlsphi_flux_slots_30(s, block, tile, base, parts, &sum);
+    else if (s->has_J) tlsphi_flux_slots_21(s, block, tile, base, parts, &sum);
+    else tlsphi_flux_slots_20(s, block, tile, base, parts, &sum);
+    for (size_t a = begin; a < end; a++, out++) {
+        const size_t l = a - base;
+        for (size_t i = 0; i < D; i++) out->T[i] = sum.T[i * TLSPHI_LANES + l];
+        out->J = sum.J[l];
+        out->production = sum.production[l];
+        out->heat = sum.heat[l];
+        out->source = sum.source[l];
+        out->conduction = sum.conduction[l];
+    }
+}
+
+/* -- what becomes of the sums -- */
+
+static void tlsphi_add_gathered(tlsphi_gathered *sum, const tlsphi_gathered *more) {
     for (int i = 0; i < 3; i++) sum->T[i] += more->T[i];
     sum->J += more->J;
     sum->heat += more->heat;
     sum->production += more->production;
 }
 /* Frozen dissipation (see [STEP]): evaluates and keeps it in the first stage, adds it in all. */
-TLSPHI_INLINE void tlsphi_keep_damping(const tlsph_solver *s, size_t a, const int dim, const tlsphi_gathered *damping) {
-    tlsph_real *held = s->held + (size_t)(dim + 2) * a;
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) held[i] = damping->T[i];
-    held[dim] = damping->J;
-    held[dim + 1] = tlsphi_dot(dim, s->w + (size_t)dim * a, damping->T) +
-                    (s->thermal == TLSPH_ENERGY ? damping->heat : damping->production / 2);
-    if (s->S && s->thermal != TLSPH_ENERGY) held[dim + 1] += s->S[a] * damping->J;
+static tlsph_real tlsphi_sigma(const tlsph_solver *s, size_t a) { return s->has_J ? *tlsphi_at(s, s->rows.S, a) : 0; }
+static void tlsphi_keep_damping(const tlsph_solver *s, size_t a, const tlsphi_gathered *damping) {
+    tlsph_real *held = s->held + (size_t)(s->dim + 2) * a, w[3] = {0, 0, 0};
+    tlsphi_row_get(s, s->rows.w, s->dim, a, w);
+    for (int i = 0; i < s->dim; i++) held[i] = damping->T[i];
+    held[s->dim] = damping->J;
+    held[s->dim + 1] = tlsphi_dot(s->dim, w, damping->T) + damping->heat + damping->production / 2 +
+                       tlsphi_sigma(s, a) * damping->J;
 }
-TLSPHI_INLINE void tlsphi_add_damping(const tlsph_solver *s, size_t a, const int dim, tlsphi_gathered *sum) {
-    const tlsph_real *held = s->held + (size_t)(dim + 2) * a;
-    const tlsph_real heat = held[dim + 1] - tlsphi_dot(dim, s->w + (size_t)dim * a, held); /* share + Sigma_J D_J */
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->T[i] += held[i];
-    sum->J += held[dim];
-    sum->production += 2 * (heat - (s->S ? s->S[a] * held[dim] : 0));
-    if (s->thermal == TLSPH_ENERGY) sum->heat += heat;
+static void tlsphi_add_damping(const tlsph_solver *s, size_t a, tlsphi_gathered *sum) {
+    const tlsph_real *held = s->held + (size_t)(s->dim + 2) * a;
+    tlsph_real w[3] = {0, 0, 0};
+    tlsphi_row_get(s, s->rows.w, s->dim, a, w);
+    const tlsph_real heat = held[s->dim + 1] - tlsphi_dot(s->dim, w, held); /* share + Sigma_J D_J */
+    for (int i = 0; i < s->dim; i++) sum->T[i] += held[i];
+    sum->J += held[s->dim];
+    sum->production += 2 * (heat - tlsphi_sigma(s, a) * held[s->dim]);
 }
 
 /* Relaxation of J towards det F, -r c_p/tau phi, r = min(1, r0 (c_s/c_p)^2 (1 + (ln(J/d)/0.05)^2)): slower the closer nu
@@ -4233,9 +4938,11 @@ TLSPHI_INLINE void tlsphi_add_damping(const tlsph_solver *s, size_t a, const int
 static tlsph_real tlsphi_relaxation(const tlsph_solver *s, size_t a) {
     tlsphi_point pt;
     tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
-    const tlsph_real ratio = s->wave[4 * a + 1] / s->wave[4 * a], strain = tlsphi_log(pt.J / pt.d) / TLSPHI_R(0.05);
+    tlsph_real wave[2];
+    tlsphi_row_get(s, s->rows.wave, 2, a, wave);
+    const tlsph_real ratio = wave[1] / wave[0], strain = tlsphi_log(pt.J / pt.d) / TLSPHI_R(0.05);
     const tlsph_real r = tlsphi_min(1, s->drift_relaxation * ratio * ratio * (1 + strain * strain));
-    return -r * s->wave[4 * a] / s->tau[a] * (pt.J - pt.d);
+    return -r * wave[0] / s->tau[a] * (pt.J - pt.d);
 }
 
 /* Turns the gathered sums of one particle into rates per volume and block sums. */
@@ -4249,8 +4956,10 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
     block[TLSPHI_SUM_DISSIPATION] += (double)sum->production / 2;
     block[TLSPHI_SUM_LEAST] = tlsphi_dmin(block[TLSPHI_SUM_LEAST], sum->least);
     if (!s->rate_E) return;
-    const tlsph_real theta = s->theta[a];
+    const tlsph_real theta = *tlsphi_at(s, s->rows.theta, a);
     tlsph_real rate = sum->heat * inverse;
+    if (s->thermal == TLSPH_ENERGY) /* D_E - v_a . D_p */
+        rate += (sum->production / 2 + tlsphi_sigma(s, a) * sum->J) * inverse;
     block[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)(sum->production / (2 * theta));
     block[TLSPHI_SUM_CONDUCTION_ENTROPY] += (double)sum->conduction;
     if (s->heat_moves) { /* -Q.grad theta/theta^2, the source of (57) */
@@ -4259,59 +4968,31 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
         if (s->thermal == TLSPH_ENTROPY) rate += source * inverse;
     }
     if (s->thermal == TLSPH_ENTROPY && s->dissipation_heats) rate += sum->production * inverse / (2 * theta);
-    if (s->thermal == TLSPH_ENTROPY && s->drift_relaxation > 0 && s->rate_J) rate -= relaxation * s->S[a] / theta;
+    if (s->thermal == TLSPH_ENTROPY && s->drift_relaxation > 0 && s->rate_J) rate -= relaxation * tlsphi_sigma(s, a) / theta;
     s->rate_E[a] = s->thermal == TLSPH_ENERGY ? s->rate_E[a] + rate : rate;
 }
 
-TLSPHI_INLINE void tlsphi_flux_range(tlsph_solver *s, tlsphi_block *block, const int dim, const int with_J,
-                                     const int thermal, const int plain) {
-    const int first = s->parted ? TLSPHI_STRESSES : TLSPHI_BOTH, passes = s->parted && (!s->frozen || s->damps) ? 2 : 1;
-    for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_gathered part[2]; /* all, or stresses and damping apart */
-        memset(part, 0, sizeof part);
-        part[0].least = part[1].least = TLSPHI_LARGEST;
-        for (int k = 0; k < passes; k++) /* one place, so that it is compiled once */
-            tlsphi_flux_pairs(s, a, dim, with_J, thermal, plain, k ? TLSPHI_DAMPING : first, &part[k]);
-        if (passes == 2 && s->frozen) tlsphi_keep_damping(s, a, dim, &part[1]);
-        if (passes == 2 && !s->frozen) tlsphi_add_gathered(&part[0], &part[1]);
-        part[0].least = tlsphi_dmin(part[0].least, part[1].least);
-        if (s->frozen) tlsphi_add_damping(s, a, dim, &part[0]);
-        tlsphi_flux_store(s, a, &part[0], block->sums);
-    }
-}
-#define TLSPHI_FLUX(dim, J, thermal)                                                                                   \
-    static void tlsphi_flux_##dim##J##thermal(tlsph_solver *s, tlsphi_block *b) {                                      \
-        tlsphi_flux_range(s, b, dim, J, thermal, 1);                                                                   \
-    }
-TLSPHI_FLUX(2, 0, 0)
-TLSPHI_FLUX(2, 0, 1) TLSPHI_FLUX(2, 0, 2) TLSPHI_FLUX(2, 1, 0) TLSPHI_FLUX(2, 1, 1) TLSPHI_FLUX(2, 1, 2)
-    TLSPHI_FLUX(3, 0, 0) TLSPHI_FLUX(3, 0, 1) TLSPHI_FLUX(3, 0, 2) TLSPHI_FLUX(3, 1, 0) TLSPHI_FLUX(3, 1, 1)
-        TLSPHI_FLUX(3, 1, 2)
-
-    /* All else: other dissipations, corrected kernels, audit. */
-    static void tlsphi_flux_any(tlsph_solver *s, tlsphi_block *block) {
-    if (s->dim == 3) tlsphi_flux_range(s, block, 3, s->has_J, s->thermal, 0);
-    else tlsphi_flux_range(s, block, 2, s->has_J, s->thermal, 0);
-}
 static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
+    const int first = s->parted ? TLSPHI_STRESSES : TLSPHI_BOTH, passes = s->parted && (!s->frozen || s->damps) ? 2 : 1;
+    tlsphi_gathered part[2][TLSPHI_LANES_MOST]; /* all, or stresses and damping apart */
     for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
-    if (s->dissipation != TLSPH_LIMITED || s->M || s->rest || s->audit) {
-        tlsphi_flux_any(s, block);
-        return;
-    }
-    switch ((s->dim == 3 ? 6 : 0) + (s->has_J ? 3 : 0) + s->thermal) {
-    case 0: tlsphi_flux_200(s, block); break;
-    case 1: tlsphi_flux_201(s, block); break;
-    case 2: tlsphi_flux_202(s, block); break;
-    case 3: tlsphi_flux_210(s, block); break;
-    case 4: tlsphi_flux_211(s, block); break;
-    case 5: tlsphi_flux_212(s, block); break;
-    case 6: tlsphi_flux_300(s, block); break;
-    case 7: tlsphi_flux_301(s, block); break;
-    case 8: tlsphi_flux_302(s, block); break;
-    case 9: tlsphi_flux_310(s, block); break;
-    case 10: tlsphi_flux_311(s, block); break;
-    default: tlsphi_flux_312(s, block); break;
+    for (size_t begin = block->begin, tile = block->tile, end; begin < block->end; begin = end, tile++) {
+        end = tlsphi_tile_end(block, begin);
+        memset(part, 0, sizeof part);
+        for (int k = 0; k < passes; k++) {
+            const int parts = k ? TLSPHI_DAMPING : first;
+            for (size_t i = 0; i < end - begin; i++) part[k][i].least = TLSPHI_LARGEST;
+            if (s->lanes) tlsphi_flux_tile(s, block, tile, begin, end, parts, part[k]);
+            else tlsphi_flux_one_by_one(s, begin, end, parts, part[k]);
+        }
+        for (size_t a = begin; a < end; a++) {
+            tlsphi_gathered *sum = &part[0][a - begin], *damping = &part[1][a - begin];
+            if (passes == 2 && s->frozen) tlsphi_keep_damping(s, a, damping);
+            if (passes == 2 && !s->frozen) tlsphi_add_gathered(sum, damping);
+            if (passes == 2) sum->least = tlsphi_dmin(sum->least, damping->least);
+            if (s->frozen) tlsphi_add_damping(s, a, sum);
+            tlsphi_flux_store(s, a, sum, block->sums);
+        }
     }
 }
 
@@ -4369,11 +5050,11 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
 
 /* Where the projection of this stage sees a particle, and (next) where the stage takes it. Linear elasticity
    takes moments about the reference positions: there P is symmetric, not P F^T, and X x p is what is conserved. */
-static double tlsphi_next_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t at) {
+TLSPHI_INLINE double tlsphi_next_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t at) {
     const double was = (double)s->old.x[at];
     return was + stage->b * ((double)s->now.x[at] - was) + stage->c * dt * (double)s->v[at];
 }
-static void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double X[3]) {
+TLSPHI_INLINE void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double X[3]) {
     const size_t D = (size_t)s->dim;
     X[2] = 0;
     for (size_t i = 0; i < D; i++)
@@ -4442,7 +5123,7 @@ static tlsph_real tlsphi_heat_power(const tlsph_solver *s, const tlsphi_load *lo
 static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        const tlsph_real theta = s->theta[a];
+        const tlsph_real theta = (*tlsphi_theta(s, a));
         const tlsph_real power = tlsphi_heat_power(s, load, i);
         s->rate_E[a] += power / s->V[a] / (s->thermal == TLSPH_ENTROPY ? theta : 1);
         s->account.external_heat += stage->rate_weight * dt * (double)power;
@@ -4602,7 +5283,7 @@ typedef struct tlsphi_projection {
 static void tlsphi_projection_origin(const tlsphi_projection *p, const tlsphi_block *block, double origin[3]) {
     tlsphi_stage_position(p->s, &p->stage, p->dt, p->s->body[block->body].first, origin);
 }
-static void tlsphi_projection_arm(const tlsphi_projection *p, const double origin[3], size_t a, double X[3]) {
+TLSPHI_INLINE void tlsphi_projection_arm(const tlsphi_projection *p, const double origin[3], size_t a, double X[3]) {
     tlsphi_stage_position(p->s, &p->stage, p->dt, a, X);
     for (int i = 0; i < 3; i++) X[i] -= origin[i];
 }
@@ -4611,7 +5292,7 @@ static void tlsphi_projection_centre(const tlsphi_projection *p, const tlsphi_bl
     tlsphi_projection_origin(p, block, centre);
     for (int i = 0; i < 3; i++) centre[i] += p->s->body[block->body].centre[i];
 }
-static void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
+TLSPHI_INLINE void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
     out[2] = 0;
     for (int i = 0; i < dim; i++) out[i] = (double)v[i];
 }
@@ -4719,7 +5400,8 @@ static void tlsphi_relative_task(void *arg, size_t i) {
         tlsphi_projection_arm(p, centre, a, X);
         tlsphi_cross3(body->spin, X, turn);
         for (size_t k = 0; k < D; k++)
-            s->w[D * a + k] = (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
+            tlsphi_at(s, s->rows.w, a)[k * TLSPHI_ROW] =
+                (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
     }
 }
 static void tlsphi_correct_task(void *arg, size_t i) {
@@ -4910,7 +5592,7 @@ TLSPHI_INLINE tlsph_real tlsphi_pressure_pair(const tlsph_solver *s, size_t a, s
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
     tlsphi_multiply_mean(dim, s->pressure.A + dd * a, s->pressure.A + dd * b, g, c);
     if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, C);
-    const tlsph_real Cd = tlsphi_dot(dim, s->M ? C : g, d), rho = (s->wave[4 * a + 2] + s->wave[4 * b + 2]) / 2;
+    const tlsph_real Cd = tlsphi_dot(dim, s->M ? C : g, d), rho = (tlsphi_material_of(s, a)->rho + tlsphi_material_of(s, b)->rho) / 2;
     return Cd > 0 ? tlsphi_dot(dim, c, c) / (rho * Cd) : 0;
 }
 TLSPHI_INLINE void tlsphi_pressure_diagonal(tlsph_solver *s, const tlsphi_solution *q, size_t a, const int dim) {
@@ -4921,10 +5603,10 @@ TLSPHI_INLINE void tlsphi_pressure_diagonal(tlsph_solver *s, const tlsphi_soluti
         const size_t b = s->neighbour[k];
         tlsphi_multiply(dim, s->pressure.A + dd * a, s->g + D * k, Ag);
         for (size_t j = 0; j < D; j++) sum[j] += Ag[j];
-        wide += tlsphi_dot(dim, Ag, Ag) / (4 * s->wave[4 * b + 2] * s->V[b]);
+        wide += tlsphi_dot(dim, Ag, Ag) / (4 * tlsphi_material_of(s, b)->rho * s->V[b]);
         compact += tlsphi_pressure_pair(s, a, b, s->g + D * k, dim, d);
     }
-    wide += tlsphi_dot(dim, sum, sum) / (4 * s->wave[4 * a + 2] * s->V[a]);
+    wide += tlsphi_dot(dim, sum, sum) / (4 * tlsphi_material_of(s, a)->rho * s->V[a]);
     s->pressure.compact[a] = s->V[a] * tlsphi_material_of(s, a)->compressibility / T + s->laplacian_share * T * compact;
     s->pressure.diagonal[a] = s->pressure.compact[a] + (tlsph_real)q->w * wide;
 }
@@ -4949,13 +5631,13 @@ TLSPHI_INLINE void tlsphi_pressure_force(const tlsph_solver *s, const tlsphi_sol
             slope[i] += jump * g[i];
         }
     }
-    const tlsph_real inverse = 1 / s->V[a], rho = s->wave[4 * a + 2];
+    const tlsph_real inverse = 1 / s->V[a], rho = tlsphi_material_of(s, a)->rho;
     for (size_t i = 0; i < D; i++) {
         q->out[D * a + i] = T[i] * inverse / rho;
         slope[i] *= inverse;
     }
     if (!q->gradient) return;
-    tlsphi_store_slope(s, a, dim, slope, s->pressure.slope + D * a);
+    tlsphi_correct_slope(s, a, dim, slope, s->pressure.slope + D * a);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
         if (!m->tangent) tlsphi_mirror_vector(dim, m, s->pressure.slope + D * a);
 }
@@ -5248,14 +5930,15 @@ static double tlsphi_heat_step(const tlsph_solver *s) {
 TLSPHI_INLINE void tlsphi_theta_gradient(tlsph_solver *s, size_t a, const int dim) {
     const size_t D = (size_t)dim;
     const tlsph_real half = 1 / (2 * s->V[a]);
-    tlsph_real grad[3] = {0, 0, 0};
+    tlsph_real grad[3] = {0, 0, 0}, slope[3];
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const tlsph_real jump = (s->theta[s->neighbour[k]] - s->theta[a]) * half;
+        const tlsph_real jump = (*tlsphi_theta(s, s->neighbour[k]) - *tlsphi_theta(s, a)) * half;
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) grad[i] += jump * s->g[D * k + (size_t)i];
     }
-    tlsphi_store_slope(s, a, dim, grad, s->grad_theta + D * a);
+    tlsphi_correct_slope(s, a, dim, grad, slope);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
-        if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, s->grad_theta + D * a);
+        if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, slope);
+    tlsphi_row_put(s, s->rows.slope_theta, dim, a, slope);
     tlsphi_heat_flux(s, a);
 }
 static void tlsphi_theta_gradient_block(tlsph_solver *s, tlsphi_block *block) {
@@ -5267,8 +5950,10 @@ static void tlsphi_theta_gradient_block(tlsph_solver *s, tlsphi_block *block) {
 /* rate_E becomes d theta/dt, K/s. */
 TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
     const size_t D = (size_t)dim, dd = D * D;
-    tlsphi_gathered sum;
+    tlsphi_heat_side side_a, side_b;
+    tlsphi_pair_of_heat sum, heat;
     memset(&sum, 0, sizeof sum);
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), dim, &side_a);
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
         const tlsph_real *g = s->g + D * k, *C = g;
@@ -5278,7 +5963,11 @@ TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
             tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
             C = skew;
         }
-        tlsphi_pair_heat(s, a, b, g, C, rest, dim, TLSPH_ENERGY, &sum);
+        tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), dim, &side_b);
+        tlsphi_pair_heat(&side_a, &side_b, g, C, rest, dim, TLSPH_ENERGY, s->conduction == TLSPH_COMPACT, &heat);
+        sum.heat += heat.heat;
+        sum.source += heat.source;
+        sum.conduction += heat.conduction;
     }
     s->rate_E[a] = sum.heat / (s->V[a] * tlsphi_material_of(s, a)->c_v) + s->super.source[a];
 }
@@ -5327,12 +6016,12 @@ static double tlsphi_super_hold(tlsph_solver *s, double time, int book) {
         tlsphi_load_values(s, load, time);
         for (size_t i = 0; i < load->given.count; i++) {
             const size_t a = load->inner[i];
-            s->theta[a] = load->values[i];
+            (*tlsphi_theta(s, a)) = load->values[i];
             if (!book) continue;
-            const double gain = (double)((s->theta[a] - s->super.current[a]) * s->V[a] * tlsphi_material_of(s, a)->c_v);
+            const double gain = (double)(((*tlsphi_theta(s, a)) - s->super.current[a]) * s->V[a] * tlsphi_material_of(s, a)->c_v);
             s->account.external_heat += gain;
-            entropy += gain / (double)s->theta[a];
-            s->super.current[a] = s->theta[a];
+            entropy += gain / (double)(*tlsphi_theta(s, a));
+            s->super.current[a] = (*tlsphi_theta(s, a));
         }
     }
     return entropy;
@@ -5368,13 +6057,13 @@ static void tlsphi_super_task(void *arg, size_t i) {
     const tlsph_real rest = 1 - stage->mu - stage->nu;
     for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
         if (stage->number == 1) {
-            y->first[a] = y->previous[a] = y->current[a] = s->theta[a];
+            y->first[a] = y->previous[a] = y->current[a] = (*tlsphi_theta(s, a));
             y->rate[a] = s->rate_E[a];
         }
         const tlsph_real next = stage->mu * y->current[a] + stage->nu * y->previous[a] + rest * y->first[a] +
                                 stage->now * s->rate_E[a] + stage->then * y->rate[a];
         y->previous[a] = y->current[a];
-        y->current[a] = s->theta[a] = next;
+        y->current[a] = (*tlsphi_theta(s, a)) = next;
     }
 }
 /* E or eta from the new temperatures, and the entropy that was made. */
@@ -5419,16 +6108,15 @@ static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double d
    a step w may turn against T_D, so that a share, and the production of a pair, may be negative by O(dt) of itself. */
 
 /* dH/dt = F x grad v, before F itself changes. */
-static void tlsphi_update_cofactor(tlsph_solver *s, size_t a, tlsph_real B, tlsph_real C) {
-    const int dim = s->dim;
+TLSPHI_INLINE void tlsphi_update_cofactor(tlsph_solver *s, size_t a, const int dim, tlsph_real B, tlsph_real C) {
     const size_t dd = (size_t)(dim * dim);
-    tlsph_real F[9], G[9], rate[9], in_plane[9];
+    tlsph_real F[9], G[9], rate[9], in_plane[9], *now = s->now.H + dd * a;
+    const tlsph_real *old = s->old.H + dd * a;
     tlsphi_expand(dim, s->now.F + dd * a, 1, F);
     tlsphi_expand(dim, s->rate_F + dd * a, 0, G);
-    tlsph_cross(F, G, rate);
+    tlsphi_cross_inline(F, G, rate);
     tlsphi_shrink(dim, rate, in_plane);
-    for (size_t i = dd * a; i < dd * (a + 1); i++)
-        s->now.H[i] = s->old.H[i] + B * (s->now.H[i] - s->old.H[i]) + C * in_plane[i - dd * a];
+    TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) now[i] = old[i] + B * (now[i] - old[i]) + C * in_plane[i];
 }
 /* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
 static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
@@ -5450,7 +6138,10 @@ static void tlsphi_update_task(void *arg, size_t i) {
     tlsph_solver *s = up->s;
     const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real B = up->B, C = up->C;
-    for (size_t a = begin; s->has_H && a < end; a++) tlsphi_update_cofactor(s, a, B, C);
+    for (size_t a = begin; s->has_H && a < end; a++) {
+        if (s->dim == 3) tlsphi_update_cofactor(s, a, 3, B, C);
+        else tlsphi_update_cofactor(s, a, 2, B, C);
+    }
     for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
     tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, B, C);
     tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, B, C);
@@ -6025,7 +6716,7 @@ TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tl
     if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s);
     for (size_t a = 0; s->now.plastic && field == TLSPH_FIELD_F && a < s->n; a++) tlsphi_flow(s, a);
     for (size_t a = 0; s->thermal && a < s->n; a++)
-        tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : s->theta[a]);
+        tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : (*tlsphi_theta(s, a)));
     const tlsphi_block *bad = tlsphi_evaluate(s);
     if (bad) {
         result = tlsphi_describe_failure(s, bad, "write");
@@ -6437,12 +7128,208 @@ static void tlsphi_smoothing_length(tlsphi_plan *plan) {
     for (size_t a = 0; local && a < plan->n; a++) spacing = tlsphi_dmax(a ? spacing : 0, (double)local[a]);
     plan->h = spacing * (double)plan->desc->support;
 }
+/* Blocks end with the rows' blocks and with bodies, tiles also with every TLSPHI_LANES particles. */
+static int tlsphi_block_begins(const tlsphi_plan *plan, size_t a) {
+    return a % TLSPHI_BLOCK == 0 || plan->body[a] != plan->body[a - 1];
+}
+static int tlsphi_tile_begins(const tlsphi_plan *plan, size_t a) {
+    return a % TLSPHI_LANES == 0 || tlsphi_block_begins(plan, a);
+}
 static void tlsphi_count_blocks(tlsphi_plan *plan) {
-    for (size_t a = 0, in_block = 0; a < plan->n; a++, in_block++) {
-        if (a && plan->body[a] == plan->body[a - 1] && in_block < TLSPHI_BLOCK) continue;
-        plan->blocks++;
-        in_block = 0;
+    for (size_t a = 0; a < plan->n; a++) plan->blocks += tlsphi_block_begins(plan, a) ? 1 : 0;
+}
+
+/* ==== [TILES] ======================================================================================================
+   Neighbours by tiles of TLSPHI_LANES consecutive particles. A slot holds one neighbour for each of them. On a lattice
+   whose particles are ordered by rows most of the neighbours of a tile in one direction are consecutive, too: such a slot
+   needs only their first number. Pairs that fit no such slot (at the ends of rows of unequal length, in clouds) share
+   slots with a list of numbers. A lane without a pair in a slot has the vector 0 and reads any particle.
+   The vectors of a slot are a pattern; equal patterns are stored once, and a lattice has few. */
+
+#define TLSPHI_PATTERNS_SEEN 32768
+
+/* What building takes: the pairs of the particles of one tile, and arrays that grow. */
+typedef struct tlsphi_tiler {
+    tlsphi_plan *plan;
+    tlsphi_graph *graph;
+    int damped;               /* pairs of the dissipation (TLSPH_CELLS_4) */
+    size_t base, begin, end;  /* a - base is the lane */
+    size_t count[TLSPHI_LANES_MOST], most;
+    uint32_t *list;           /* lanes x most */
+    double *g;                /* lanes x most x D */
+    tlsph_real *size;         /* lanes x most: |C_ab| */
+    uint8_t *done;            /* lanes x most */
+    size_t slot_room, pattern_room, gather_room;
+    uint32_t *seen; /* hash table of patterns, number + 1 */
+    tlsph_real pattern[4 * TLSPHI_LANES_MOST];
+} tlsphi_tiler;
+
+/* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
+static void tlsphi_sort_pairs(int dim, uint32_t *list, double *g, size_t count) {
+    for (size_t i = 1; i < count; i++) {
+        const uint32_t b = list[i];
+        double vector[3] = {0, 0, 0};
+        size_t j = i;
+        for (int k = 0; k < dim; k++) vector[k] = g[(size_t)dim * i + (size_t)k];
+        for (; j > 0 && list[j - 1] > b; j--) {
+            list[j] = list[j - 1];
+            for (int k = 0; k < dim; k++) g[(size_t)dim * j + (size_t)k] = g[(size_t)dim * (j - 1) + (size_t)k];
+        }
+        list[j] = b;
+        for (int k = 0; k < dim; k++) g[(size_t)dim * j + (size_t)k] = vector[k];
     }
+}
+
+/* Pairs of the dissipation of a particle of a lattice of order 4: those that share a face, with its area. */
+static size_t tlsphi_damped_pairs_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
+    const size_t D = (size_t)plan->dim;
+    tlsphi_stencil stencil;
+    size_t count = 0;
+    tlsphi_stencil_of(plan, a, &stencil);
+    for (size_t i = 0; i < stencil.count; i++) {
+        const double *across = stencil.across[i], size = fabs(across[0]) + fabs(across[1]) + fabs(across[2]);
+        if (!(size > 0)) continue;
+        for (size_t k = 0; k < D; k++) g[D * count + k] = across[k];
+        list[count++] = stencil.b[i];
+    }
+    return count;
+}
+/* Pairs of a lane in the solver's numbers; g becomes the vector that the solver stores. */
+static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
+    const tlsphi_plan *plan = t->plan;
+    const size_t D = (size_t)plan->dim, lane = a - t->base, h = plan->host[a];
+    uint32_t *list = t->list + lane * t->most;
+    double *g = t->g + D * lane * t->most;
+    const size_t count = t->damped ? tlsphi_damped_pairs_of(plan, h, list, g) : tlsphi_neighbours_of(plan, h, list, g);
+    for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
+    tlsphi_sort_pairs(plan->dim, list, g, count);
+    for (size_t i = 0; i < count; i++) {
+        double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, C[3] = {0, 0, 0};
+        if (t->damped) memcpy(C, g + D * i, D * sizeof *C);
+        else tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, C);
+        double size = sqrt(tlsphi_norm2(C));
+        if (plan->correction) tlsphi_round_vectors(plan, &size, 1);
+        t->size[lane * t->most + i] = (tlsph_real)size;
+        for (size_t k = 0; k < D && plan->antisymmetric; k++) g[D * i + k] = C[k];
+    }
+    t->count[lane] = count;
+}
+/* Number of the pattern in t->pattern; TLSPHI_NONE if there is no memory. */
+static uint32_t tlsphi_tile_pattern(tlsphi_tiler *t) {
+    tlsphi_graph *graph = t->graph;
+    const size_t reals = (size_t)(t->plan->dim + 1) * TLSPHI_LANES, bytes = reals * sizeof *t->pattern;
+    const uint64_t hash = tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)(const void *)t->pattern, bytes);
+    size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
+    for (int probe = 0; probe < 8 && t->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
+        if (memcmp(graph->pattern + (t->seen[at] - 1) * reals, t->pattern, bytes) == 0) return t->seen[at] - 1;
+    if (!tlsphi_scratch_grow(t->plan, (void **)&graph->pattern, &t->pattern_room, graph->patterns + 1, bytes))
+        return TLSPHI_NONE;
+    memcpy(graph->pattern + graph->patterns * reals, t->pattern, bytes);
+    t->seen[at] = (uint32_t)++graph->patterns; /* if the table is full there, an older one is forgotten */
+    return t->seen[at] - 1;
+}
+static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
+    const size_t D = (size_t)t->plan->dim, at = lane * t->most + i;
+    t->done[at] = 1;
+    for (size_t k = 0; k < D; k++) t->pattern[k * TLSPHI_LANES + lane] = (tlsph_real)t->g[D * at + k];
+    t->pattern[D * TLSPHI_LANES + lane] = t->size[at];
+}
+/* Closes a slot: the pattern is set; `from` is the first neighbour, or, scattered, the place of the list. */
+static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
+    tlsphi_graph *graph = t->graph;
+    const uint32_t pattern = tlsphi_tile_pattern(t);
+    memset(t->pattern, 0, sizeof t->pattern);
+    if (pattern == TLSPHI_NONE ||
+        !tlsphi_scratch_grow(t->plan, (void **)&graph->slot, &t->slot_room, graph->slots + 1, sizeof *graph->slot))
+        return 0;
+    graph->slot[graph->slots].pattern = pattern;
+    graph->slot[graph->slots].from = (uint32_t)from;
+    graph->slot[graph->slots++].scattered = scattered;
+    return 1;
+}
+/* Pair of a lane whose neighbour lies `lane - reference` behind b, if it has not been taken; t->most otherwise. */
+static size_t tlsphi_tile_find(const tlsphi_tiler *t, size_t lane, size_t from) {
+    for (size_t i = 0; i < t->count[lane]; i++)
+        if (t->list[lane * t->most + i] == from + lane && !t->done[lane * t->most + i]) return i;
+    return t->most;
+}
+/* A slot of consecutive neighbours from + lane, if half of the lanes or more have them. */
+static int tlsphi_tile_consecutive(tlsphi_tiler *t, size_t from) {
+    size_t found = 0;
+    if (from % TLSPHI_BLOCK + TLSPHI_LANES > TLSPHI_BLOCK) return 1;
+    for (size_t lane = t->begin - t->base; lane < t->end - t->base; lane++)
+        found += tlsphi_tile_find(t, lane, from) < t->most;
+    if (2 * found < t->end - t->begin) return 1;
+    for (size_t lane = t->begin - t->base; lane < t->end - t->base; lane++) {
+        const size_t i = tlsphi_tile_find(t, lane, from);
+        if (i < t->most) tlsphi_tile_take(t, lane, i);
+    }
+    return tlsphi_tile_emit(t, from, 0);
+}
+/* A slot with the first pair of each lane that is left; 2: nothing is left. */
+static int tlsphi_tile_scattered(tlsphi_tiler *t) {
+    tlsphi_graph *graph = t->graph;
+    const size_t from = graph->gathers * TLSPHI_LANES;
+    int left = 0;
+    if (!tlsphi_scratch_grow(t->plan, (void **)&graph->gathered, &t->gather_room, from + TLSPHI_LANES, sizeof(uint32_t)))
+        return 0;
+    for (size_t lane = 0; lane < TLSPHI_LANES; lane++) {
+        size_t i = 0;
+        graph->gathered[from + lane] = (uint32_t)t->begin;
+        if (lane < t->begin - t->base || lane >= t->end - t->base) continue;
+        while (i < t->count[lane] && t->done[lane * t->most + i]) i++;
+        if (i == t->count[lane]) continue;
+        graph->gathered[from + lane] = t->list[lane * t->most + i];
+        tlsphi_tile_take(t, lane, i);
+        left = 1;
+    }
+    if (!left) return 2;
+    graph->gathers++;
+    return tlsphi_tile_emit(t, from, 1);
+}
+static int tlsphi_tile_build(tlsphi_tiler *t) {
+    int more = 1;
+    memset(t->count, 0, sizeof t->count);
+    memset(t->done, 0, TLSPHI_LANES * t->most);
+    for (size_t a = t->begin; a < t->end; a++) tlsphi_tile_lane(t, a);
+    for (size_t lane = t->begin - t->base; lane < t->end - t->base; lane++)
+        for (size_t i = 0; i < t->count[lane]; i++) {
+            const size_t at = lane * t->most + i;
+            if (!t->done[at] && t->list[at] >= lane && !tlsphi_tile_consecutive(t, t->list[at] - lane)) return 0;
+        }
+    while (more == 1) more = tlsphi_tile_scattered(t);
+    return more;
+}
+static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
+    const size_t D = (size_t)plan->dim, n = plan->n, all = TLSPHI_LANES * plan->most;
+    tlsphi_tiler tiler, *t = &tiler;
+    memset(t, 0, sizeof *t);
+    t->plan = plan;
+    t->damped = damped;
+    t->graph = plan->graph + damped;
+    t->most = plan->most;
+    t->list = TLSPHI_SCRATCH(plan, uint32_t, all);
+    t->g = TLSPHI_SCRATCH(plan, double, D * all);
+    t->size = TLSPHI_SCRATCH(plan, tlsph_real, all);
+    t->done = TLSPHI_SCRATCH(plan, uint8_t, all);
+    t->seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
+    for (size_t a = 0; a < n; a++) t->graph->tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
+    t->graph->first = TLSPHI_SCRATCH(plan, size_t, t->graph->tiles + 1);
+    if (!t->list || !t->g || !t->size || !t->done || !t->seen || !t->graph->first)
+        return tlsphi_no_memory(plan, 64.0 * (double)all);
+    for (size_t tile = 0; t->end < n; tile++) {
+        t->begin = t->end;
+        do t->end++;
+        while (t->end < n && !tlsphi_tile_begins(plan, t->end));
+        t->base = t->begin / TLSPHI_LANES * TLSPHI_LANES;
+        if (!tlsphi_tile_build(t)) return tlsphi_no_memory(plan, 64.0 * (double)t->graph->slots);
+        t->graph->first[tile + 1] = t->graph->slots;
+    }
+    return TLSPH_OK;
+}
+static tlsph_result tlsphi_tiles(tlsphi_plan *plan) {
+    const tlsph_result r = tlsphi_graph_build(plan, 0);
+    return r || !plan->lattice ? r : tlsphi_graph_build(plan, 1);
 }
 
 /* Everything that creation can find out without the solver's memory. Leaves scratch for tlsphi_plan_release. */
@@ -6486,9 +7373,9 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     if (desc->sharp_gradients && (!plan->antisymmetric || plan->bond))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "sharp_gradients", TLSPH_NO_PARTICLE, 1, 0,
                                 "0 where C_ab != -C_ba; use TLSPH_CELLS, or a box lattice with support 0.6");
-    if ((r = tlsphi_order(plan, parent))) return r;
+    if ((r = tlsphi_order(plan, parent, list, g))) return r;
     tlsphi_count_blocks(plan);
-    return TLSPH_OK;
+    return tlsphi_tiles(plan);
 }
 
 static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
@@ -6544,6 +7431,13 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->has_plastic |= d->materials[i].kind == TLSPH_VON_MISES;
         s->metal &= d->materials[i].kind == TLSPH_VON_MISES;
     }
+    s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
+    if (s->dissipation == TLSPH_JST) {
+        s->rows.lap_p = s->rows.count;
+        s->rows.count += s->dim;
+    }
+    s->lanes = s->dissipation == TLSPH_LIMITED && !s->bonds && !s->audit && !s->metal &&
+               !(s->conducts && s->corrected && s->conduction == TLSPH_COMPACT);
     s->heat_moves = s->conducts;
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
@@ -6588,34 +7482,13 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->rate_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->rate_F = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
     s->v = TLSPHI_TAKE(arena, tlsph_real, D * n);
-    s->PM = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
-    s->A = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
-    s->wave = TLSPHI_TAKE(arena, tlsph_real, 4 * n);
-    if (s->frozen) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
-    s->w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * n) : s->v;
+    s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
-    s->P_flux = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->PM;
-    s->grad_w = s->projection ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->grad_v;
-    s->slope_w = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->grad_w;
+    if (s->frozen) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
     if (s->step_rule == TLSPH_STEP_BY_PAIR) s->least_stretch = TLSPHI_TAKE(arena, tlsph_real, n);
-    if (s->dissipation == TLSPH_JST) {
-        s->lean = TLSPHI_TAKE(arena, tlsph_real, 2 * D * n);
-        s->lap_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
-    }
-    if (s->has_J) {
-        s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
-        s->S = TLSPHI_TAKE(arena, tlsph_real, n);
-        s->grad_S = TLSPHI_TAKE(arena, tlsph_real, D * n);
-    }
-    if (s->thermal) {
-        s->rate_E = TLSPHI_TAKE(arena, tlsph_real, n);
-        s->theta = TLSPHI_TAKE(arena, tlsph_real, n);
-    }
-    if (s->conducts) {
-        s->grad_theta = TLSPHI_TAKE(arena, tlsph_real, D * n);
-        s->heat = TLSPHI_TAKE(arena, tlsph_real, D * n);
-        s->h_J = TLSPHI_TAKE(arena, tlsph_real, n);
-    }
+    if (s->dissipation == TLSPH_JST) s->lean = TLSPHI_TAKE(arena, tlsph_real, 2 * D * n);
+    if (s->has_J) s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
+    if (s->thermal) s->rate_E = TLSPHI_TAKE(arena, tlsph_real, n);
     if (s->super.most) {
         tlsph_real **const arrays[6] = {&s->super.first, &s->super.previous, &s->super.current,
                                         &s->super.rate,  &s->super.source,   &s->super.E};
@@ -6656,6 +7529,13 @@ static void tlsphi_layout_loads(tlsph_solver *s, tlsphi_arena *arena, const tlsp
         if (s->load && !arena->overflow) s->load[at++] = load;
     }
 }
+static void tlsphi_layout_graph(tlsphi_arena *arena, int dim, const tlsphi_graph *plan, tlsphi_graph *out) {
+    *out = *plan;
+    out->first = TLSPHI_TAKE(arena, size_t, plan->tiles + 1);
+    out->slot = TLSPHI_TAKE(arena, tlsphi_slot, plan->slots);
+    out->gathered = TLSPHI_TAKE(arena, uint32_t, plan->gathers * TLSPHI_LANES);
+    out->pattern = TLSPHI_TAKE(arena, tlsph_real, plan->patterns * (size_t)(dim + 1) * TLSPHI_LANES);
+}
 /* Gives every array its place. Called twice: without memory to count, then with it. */
 static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_plan *plan) {
     const size_t D = (size_t)s->dim, n = s->n;
@@ -6683,8 +7563,6 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     const size_t before_pairs = arena->used;
     s->first = TLSPHI_TAKE(arena, size_t, n + 1);
     s->size.bytes_per_particle = (before_pairs - fixed + (n + 1) * sizeof(size_t)) / n;
-    s->size.bytes_per_pair = sizeof(uint32_t) + ((s->bonds ? 2 : 1) * D + (s->dissipation == TLSPH_JST)) *
-                                                    sizeof(tlsph_real);
     s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
     s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     s->damped_first = plan->lattice ? TLSPHI_TAKE(arena, size_t, n + 1) : s->first;
@@ -6693,6 +7571,10 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->image = TLSPHI_TAKE(arena, tlsphi_image, s->images);
     if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
+    tlsphi_layout_graph(arena, s->dim, plan->graph, &s->graph);
+    if (plan->lattice) tlsphi_layout_graph(arena, s->dim, plan->graph + 1, &s->damped_graph);
+    else s->damped_graph = s->graph;
+    s->size.bytes_per_pair = (arena->used - before_pairs - (n + 1) * sizeof(size_t)) / (s->pairs ? s->pairs : 1);
     s->size.bytes = arena->used + 63;
     s->size.pairs = s->pairs;
     s->size.neighbours_least = plan->least;
@@ -6702,17 +7584,25 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
 /* -- filling the block -- */
 
 static void tlsphi_fill_blocks(tlsph_solver *s, const tlsphi_plan *plan) {
-    size_t k = 0;
-    for (size_t a = 0, in_block = 0; a < s->n; a++, in_block++) {
-        const int new_body = !a || plan->body[a] != plan->body[a - 1];
-        if (new_body) s->body[plan->body[a]].first = (uint32_t)a;
-        if (new_body || in_block >= TLSPHI_BLOCK) {
-            s->block[k].begin = (uint32_t)a;
-            s->block[k++].body = plan->body[a];
-            in_block = 0;
+    tlsphi_block *block = s->block - 1;
+    uint32_t tiles = 0;
+    for (size_t a = 0; a < s->n; a++) {
+        if (a == 0 || plan->body[a] != plan->body[a - 1]) s->body[plan->body[a]].first = (uint32_t)a;
+        if (tlsphi_block_begins(plan, a)) {
+            (++block)->begin = (uint32_t)a;
+            block->body = plan->body[a];
+            block->tile = tiles;
         }
-        s->block[k - 1].end = (uint32_t)(a + 1);
+        tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
+        block->end = (uint32_t)(a + 1);
     }
+}
+static void tlsphi_fill_graph(const tlsphi_graph *plan, int dim, tlsphi_graph *out) {
+    memcpy(out->first, plan->first, (plan->tiles + 1) * sizeof *plan->first);
+    if (plan->slots) memcpy(out->slot, plan->slot, plan->slots * sizeof *plan->slot);
+    if (plan->gathers) memcpy(out->gathered, plan->gathered, plan->gathers * TLSPHI_LANES * sizeof *plan->gathered);
+    if (plan->patterns)
+        memcpy(out->pattern, plan->pattern, plan->patterns * (size_t)(dim + 1) * TLSPHI_LANES * sizeof *plan->pattern);
 }
 static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
     const size_t D = (size_t)s->dim;
@@ -6725,6 +7615,7 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
             s->material_of[a] = plan->desc->particles.materials ? plan->desc->particles.materials[h] : 0;
         for (size_t i = 0; i < D; i++) {
             s->X[D * a + i] = s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
+            tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW] = s->X[D * a + i];
             s->now.F[D * D * a + (D + 1) * i] = 1;
             if (s->has_H) s->now.H[D * D * a + (D + 1) * i] = 1;
         }
@@ -6738,21 +7629,6 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
             s->M[D * D * a + i] = (tlsph_real)plan->correction[D * D * plan->host[a] + i];
 }
 
-/* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
-static void tlsphi_sort_pairs(int dim, uint32_t *list, double *g, size_t count) {
-    for (size_t i = 1; i < count; i++) {
-        const uint32_t b = list[i];
-        double vector[3] = {0, 0, 0};
-        size_t j = i;
-        for (int k = 0; k < dim; k++) vector[k] = g[(size_t)dim * i + (size_t)k];
-        for (; j > 0 && list[j - 1] > b; j--) {
-            list[j] = list[j - 1];
-            for (int k = 0; k < dim; k++) g[(size_t)dim * j + (size_t)k] = g[(size_t)dim * (j - 1) + (size_t)k];
-        }
-        list[j] = b;
-        for (int k = 0; k < dim; k++) g[(size_t)dim * j + (size_t)k] = vector[k];
-    }
-}
 /* Pairs, boundary vectors B_a = -sum_b C_ab^skew and the time step's length tau_a = 2 dim V_a / sum_b |C_ab|. */
 static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
     const size_t D = (size_t)s->dim;
@@ -6788,15 +7664,10 @@ static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_
     const size_t D = (size_t)s->dim;
     size_t at = 0, image = 0;
     for (size_t a = 0; plan->lattice && a < s->n; a++) {
+        const size_t count = tlsphi_damped_pairs_of(plan, plan->host[a], list, g);
         tlsphi_stencil stencil;
-        size_t count = 0;
         tlsphi_stencil_of(plan, plan->host[a], &stencil);
-        for (size_t i = 0; i < stencil.count; i++) {
-            const double *across = stencil.across[i], size = fabs(across[0]) + fabs(across[1]) + fabs(across[2]);
-            if (!(size > 0)) continue;
-            for (size_t k = 0; k < D; k++) g[D * count + k] = across[k];
-            list[count++] = plan->inner[stencil.b[i]];
-        }
+        for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
         tlsphi_sort_pairs(s->dim, list, g, count);
         for (size_t i = 0; i < count; i++, at++) {
             s->damped_neighbour[at] = list[i];
@@ -6987,6 +7858,8 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
         s->materials[i].c_linear = tlsphi_sqrt(TLSPHI_R(4.0 / 3.0) * s->materials[i].mu / m->density);
     }
     tlsphi_fill_blocks(s, plan);
+    tlsphi_fill_graph(plan->graph, s->dim, &s->graph);
+    if (plan->lattice) tlsphi_fill_graph(plan->graph + 1, s->dim, &s->damped_graph);
     TLSPH_ASSERT(s->block[s->blocks - 1].end == s->n);
     tlsphi_fill_particles(s, plan);
     tlsphi_fill_pairs(s, plan, list, g);
@@ -7709,7 +8582,7 @@ static double tlsphi_voronoi_particle(tlsphi_voronoi *v, size_t a, double spacin
         tlsphi_cut_poly(&cell->poly, plane, &v->level[0].poly);
         return tlsphi_poly_volume(&v->level[0].poly, moment);
     }
-    v->level[3] = *cell; /* the cell itself stays for tlsphi_side */
+    v->level[3] = *cell; /* the cell itself stays for tlsphi_damp_side */
     return tlsphi_split_volume(cell, v->level + 3, 0, spacing);
 }
 
@@ -8800,7 +9673,8 @@ static double tlsphi_survey_particles(const tlsph_solver *s, tlsph_preflight_rep
         }
         r->spacing_least = tlsphi_dmin(r->spacing_least, tau);
         r->spacing_most = tlsphi_dmax(r->spacing_most, tau);
-        if (s->wave[4 * a] > 0) sound_step = tlsphi_dmin(sound_step, (double)s->cfl * tau / (double)s->wave[4 * a]);
+        const double c_p = (double)*tlsphi_at(s, s->rows.wave, a);
+        if (c_p > 0) sound_step = tlsphi_dmin(sound_step, (double)s->cfl * tau / c_p);
     }
     return sound_step;
 }
