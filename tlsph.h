@@ -1456,21 +1456,13 @@ static void *tlsphi_scratch_grow(tlsphi_plan *plan, void *old, size_t from, size
     return memory;
 }
 
-/* Makes an array of scratch hold `need` elements at least; what it holds moves with it. 0 if there is no memory. */
-static int tlsphi_scratch_grow(tlsphi_plan *plan, void **array, size_t *capacity, size_t need, size_t size) {
+/* Makes an array hold `need` elements at least. 0 if there is no memory. */
+static int tlsphi_scratch_room(tlsphi_plan *plan, void **array, size_t *capacity, size_t need, size_t size) {
     if (need <= *capacity) return 1;
-    const size_t more = 2 * need + 64;
-    void *memory = tlsphi_scratch_take(plan, more, size);
+    void *memory = tlsphi_scratch_grow(plan, *array, *capacity, 2 * need + 64, size);
     if (!memory) return 0;
-    for (int i = 0; i < plan->scratches && *array; i++) {
-        tlsphi_scratch *old = plan->scratch + i;
-        if (old->memory != *array) continue;
-        memcpy(memory, old->memory, *capacity * size);
-        plan->allocator.release(plan->allocator.user, old->memory, old->size);
-        *old = plan->scratch[--plan->scratches];
-    }
     *array = memory;
-    *capacity = more;
+    *capacity = 2 * need + 64;
     return 1;
 }
 
@@ -1857,7 +1849,7 @@ static tlsph_result tlsphi_fourth_build(tlsphi_plan *plan) {
 /* Kernels' vectors that differ by the round-off of positions become the same, so that few patterns serve for a lattice (see
    [TILES]). Rounding is odd: C_ab = -C_ba stays exact, and M_a is made from what is rounded. */
 static void tlsphi_round_vectors(const tlsphi_plan *plan, double *g, size_t reals) {
-    const double quantum = pow(plan->h, plan->dim - 1) * (TLSPHI_EPSILON > 1e-10 ? 1e-6 : 1e-14);
+    const double quantum = (plan->dim == 3 ? plan->h * plan->h : plan->h) * (TLSPHI_EPSILON > 1e-10 ? 1e-6 : 1e-14);
     for (size_t i = 0; i < reals; i++) g[i] = (g[i] < 0 ? -1 : 1) * floor(fabs(g[i]) / quantum + 0.5) * quantum;
 }
 static size_t tlsphi_neighbours_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
@@ -2295,7 +2287,8 @@ static void tlsphi_test_antisymmetry(tlsphi_plan *plan, uint32_t *list, double *
 /* Spacing of the lattice along each axis, seen from the first particle: the least distance along the axis of which all its
    neighbours' are multiples. Clouds have none; there it is the edge of the particle's volume. */
 static void tlsphi_row_spacing(const tlsphi_plan *plan, const uint32_t *list, size_t count, double spacing[3]) {
-    const double edge = pow(tlsphi_plan_volume(plan, 0), 1.0 / plan->dim);
+    const tlsph_real V = (tlsph_real)tlsphi_plan_volume(plan, 0), root = tlsphi_inverse_cube_root(V);
+    const double edge = plan->dim == 3 ? (double)(V * root * root) : sqrt((double)V); /* pow is not the same everywhere */
     for (int axis = 0; axis < plan->dim; axis++) {
         double d[3], least = TLSPHI_LARGEST;
         int regular = 1;
@@ -3769,7 +3762,7 @@ typedef struct tlsphi_state_lanes {
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
     const tlsphi_material *m = tlsphi_material_of(s, begin);
-    if (end - begin < TLSPHI_LANES || s->thermal == TLSPH_ENTROPY || s->incompressible || s->least_stretch || s->metal ||
+    if (end - begin < TLSPHI_LANES || s->audit || s->thermal == TLSPH_ENTROPY || s->incompressible || s->least_stretch || s->metal ||
         s->coupling == TLSPH_JOINT_AS_PRINTED || !tlsphi_has_invariants(m->kind) || m->q != 1 || (s->has_H && m->mooney))
         return 0;
     for (size_t a = begin; a < end; a++)
@@ -3893,7 +3886,7 @@ static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin,
         tlsphi_point pt;
         double heat;
         pt.c_p = x->c_p[l];
-        if (s->conducts && m->h > 0) tlsphi_load_measures(s, &s->now, m, begin + l, &pt);
+        if (s->conducts) tlsphi_load_measures(s, &s->now, m, begin + l, &pt);
         block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, begin + l, &pt, &heat));
         block->heat_step = tlsphi_dmin(block->heat_step, heat);
     }
@@ -7222,7 +7215,7 @@ static uint32_t tlsphi_tile_pattern(tlsphi_tiler *t) {
     size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
     for (int probe = 0; probe < 8 && t->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
         if (memcmp(graph->pattern + (t->seen[at] - 1) * reals, t->pattern, bytes) == 0) return t->seen[at] - 1;
-    if (!tlsphi_scratch_grow(t->plan, (void **)&graph->pattern, &t->pattern_room, graph->patterns + 1, bytes))
+    if (!tlsphi_scratch_room(t->plan, (void **)&graph->pattern, &t->pattern_room, graph->patterns + 1, bytes))
         return TLSPHI_NONE;
     memcpy(graph->pattern + graph->patterns * reals, t->pattern, bytes);
     t->seen[at] = (uint32_t)++graph->patterns; /* if the table is full there, an older one is forgotten */
@@ -7240,7 +7233,7 @@ static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
     const uint32_t pattern = tlsphi_tile_pattern(t);
     memset(t->pattern, 0, sizeof t->pattern);
     if (pattern == TLSPHI_NONE ||
-        !tlsphi_scratch_grow(t->plan, (void **)&graph->slot, &t->slot_room, graph->slots + 1, sizeof *graph->slot))
+        !tlsphi_scratch_room(t->plan, (void **)&graph->slot, &t->slot_room, graph->slots + 1, sizeof *graph->slot))
         return 0;
     graph->slot[graph->slots].pattern = pattern;
     graph->slot[graph->slots].from = (uint32_t)from;
@@ -7271,7 +7264,7 @@ static int tlsphi_tile_scattered(tlsphi_tiler *t) {
     tlsphi_graph *graph = t->graph;
     const size_t from = graph->gathers * TLSPHI_LANES;
     int left = 0;
-    if (!tlsphi_scratch_grow(t->plan, (void **)&graph->gathered, &t->gather_room, from + TLSPHI_LANES, sizeof(uint32_t)))
+    if (!tlsphi_scratch_room(t->plan, (void **)&graph->gathered, &t->gather_room, from + TLSPHI_LANES, sizeof(uint32_t)))
         return 0;
     for (size_t lane = 0; lane < TLSPHI_LANES; lane++) {
         size_t i = 0;
@@ -7322,7 +7315,7 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
         do t->end++;
         while (t->end < n && !tlsphi_tile_begins(plan, t->end));
         t->base = t->begin / TLSPHI_LANES * TLSPHI_LANES;
-        if (!tlsphi_tile_build(t)) return tlsphi_no_memory(plan, 64.0 * (double)t->graph->slots);
+        if (!tlsphi_tile_build(t)) return tlsphi_no_memory(plan, 64.0 * (double)plan->pairs);
         t->graph->first[tile + 1] = t->graph->slots;
     }
     return TLSPH_OK;
