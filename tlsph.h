@@ -2478,7 +2478,7 @@ static void tlsphi_closure_update_task(void *arg, size_t i) {
             double z[4] = {0, 0, 0, 0};
             for (size_t l = 0; l < rows; l++) {
                 const double M = (double)c->block[a][4 * k + l];
-                TLSPHI_LANES z[j] += M * r[4 * l + (size_t)j];
+                TLSPHI_FOUR z[j] += M * r[4 * l + (size_t)j];
             }
             for (size_t j = 0; j < 4; j++) sum += (q[4 * k + j] = z[j]) * r[4 * k + j];
         }
@@ -4740,7 +4740,7 @@ TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t
         tlsphi_pair_jst(s, a, b, k, flux.D_p);
         for (int i = 0; i < dim; i++) flux.production += (side_b.w[i] - side_a.w[i]) * flux.D_p[i];
     } else {
-        const tlsph_real CC = tlsphi_sqrt(tlsphi_dot(dim, C, C));
+        const tlsph_real CC = tlsphi_sqrt(tlsphi_max(tlsphi_dot(dim, C, C), TLSPHI_TINY));
         tlsphi_pair_dissipate(&side_a, &side_b, g, CC, dim, s->has_J, 1, (int)s->dissipation, s->metal, s->jump_share,
                               &flux);
     }
