@@ -136,8 +136,8 @@ static void report(const run *r) {
         ex_result("largest_drift", r->largest_drift, "1");
     ex_check_true("positive_J", r->least_J > 0);
     ex_check_below("energy_gains", r->gains / start, 1e-3);
-    /* wound up and released for longer, a column lets round-off grow like any unsteady motion */
-    if (p->options.end_time > 0.1001) ex_result("axis_offset", r->largest_offset, "m");
+    /* wound up and released for longer, a column lets round-off grow like any unsteady motion; a cloud is not symmetric */
+    if (p->options.end_time > 0.1001 || p->jitter > 0) ex_result("axis_offset", r->largest_offset, "m");
     else ex_check_below("axis_offset", r->largest_offset, sizeof(tlsph_real) == 8 ? 1e-9 : 1e-3);
 }
 
