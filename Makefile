@@ -138,17 +138,11 @@ check: build/test_float $(SLOW_PROGRAMS)
 check-only: $(SLOW_PROGRAMS)
 	@sh tests/run.sh $(SLOW_STEPS)
 
-# Branches of the header that the tests take, as gcov counts them.
+# Lines and branches of the header that the tests take, as gcov counts them.
 coverage: build/test_coverage
 	@find build/obj/coverage -name '*.gcda' -delete
 	build/test_coverage
-	cd build/obj/coverage && gcov -b -o tests implementation.c > gcov.txt 2> /dev/null
-	@sed -n "/^File.*tlsph.h'/,/^$$/p" build/obj/coverage/gcov.txt
-	@sed -n "/^File.*tlsph.h'/,/^$$/s/^Taken at least once:\([0-9.]*\)%.*/result branch_coverage \1 %/p" build/obj/coverage/gcov.txt
-
-# How far it goes: tests/extremes.c.
-extremes: build/extremes_double build/extremes_float
-	@sh tests/run.sh build/extremes_double build/extremes_float
+	@sh tests/coverage.sh
 
 # Other compilers, C libraries, word sizes, byte orders, Windows.
 portability:
