@@ -31,7 +31,7 @@ toolchain() {
     name=$1 compiler=$2 flags=$3 runner=$4
     [ -n "$only" ] && case " $only " in *" $name "*) ;; *) return ;; esac
     have "$compiler" || { skip "$name" "no $compiler"; return; }
-    filters="checkpoint/ errors/ fill/ kernels/ materials/ memory/ operators/ portable/ tensors/"
+    filters="checkpoint/ errors/ fill/ kernels/ materials/ limits/ memory/callers memory/measured memory/failing_allocations_leak operators/ portable/ tensors/"
     if [ "$runner" = - ]; then runner= filters=
     else have "$runner" || { skip "$name" "no $runner"; return; }
     fi

@@ -7,6 +7,12 @@
 #include <immintrin.h>
 #endif
 
+static void *malloc_like(void *user, size_t size)
+{
+    (void)user;
+    return malloc(size);
+}
+
 /* ---- sizes ---- */
 
 typedef struct small_scene { own_cloud cloud; tlsph_material material; tlsph_desc desc; } small_scene;
@@ -227,6 +233,122 @@ TEST(forged_checkpoints_are_undone)
     tlsph_destroy(solver);
 }
 
+/* ---- arguments, one wrong at a time ---- */
+
+TEST(every_field_says_whether_it_can_be_written)
+{
+    moving_block s = moving_block_default();
+    tlsph_solver *solver = NULL;
+    int writable = 0;
+    REQUIRE_OK(moving_block_create(&s, &solver, NULL));
+    for (int field = 0; field < TLSPH_FIELD_COUNT; field++) {
+        const tlsph_result result = tlsph_write(solver, (tlsph_field)field, NULL);
+        CHECK(result == TLSPH_ERROR_FIELD || result == TLSPH_ERROR_ARGUMENT);
+        writable += result == TLSPH_ERROR_ARGUMENT;
+    }
+    CHECK_SAME(writable, 5); /* position, velocity, F, J, temperature */
+    tlsph_destroy(solver);
+}
+static tlsph_fill good_fill(void)
+{
+    tlsph_fill f = tlsph_fill_default(3);
+    f.size[0] = f.size[1] = f.size[2] = 1;
+    f.spacing = R(0.5);
+    return f;
+}
+TEST(every_entry_of_a_fill_is_checked)
+{
+    const tlsph_real nan = R(HUGE_VAL) - R(HUGE_VAL);
+    for (int i = 0; i < 22; i++) {
+        tlsph_fill f = good_fill();
+        tlsph_cloud cloud;
+        tlsph_error error;
+        switch (i) {
+        case 0: f.cookie = 0; break;
+        case 1: f.dimension = 1; break;
+        case 2: f.dimension = 4; break;
+        case 3: f.shape = (tlsph_shape)(TLSPH_TRIANGLES + 1); break;
+        case 4: f.placement = (tlsph_placement)(TLSPH_SCATTERED + 1); break;
+        case 5: f.shape = TLSPH_PREDICATE; break;
+        case 6: f.shape = TLSPH_DISTANCE; break;
+        case 7: f.shape = TLSPH_TRIANGLES; break;
+        case 8: f.shape = TLSPH_TRIANGLES; f.surface.count = 4; break; /* not scattered */
+        case 9: f.axis = -1; break;
+        case 10: f.axis = 3; break;
+        case 11: f.origin[1] = nan; break;
+        case 12: f.size[2] = nan; break;
+        case 13: f.spacing = nan; break;
+        case 14: f.size[1] = 0; break;
+        case 15: f.spacing = 0; break;
+        case 16: f.shape = TLSPH_L_SHAPE; f.notch[0] = R(0.5); f.notch[1] = 1; break;
+        case 17: f.jitter = R(-0.1); break;
+        case 18: f.jitter = R(0.5); break;
+        case 19: f.allocator.allocate = malloc_like; break;
+        case 20: f.inner_radius = -1; break;
+        default: f.shape = TLSPH_SPHERE; f.inner_radius = 2; break; /* nothing is left */
+        }
+        const tlsph_result result = tlsph_cloud_create(&f, &cloud, &error);
+        CHECK(result == (i > 10 && i < 14 ? TLSPH_ERROR_NOT_FINITE : i == 21 ? TLSPH_ERROR_SIZE : TLSPH_ERROR_DESCRIPTION));
+        CHECK(error.message[0] != 0 && !cloud.memory);
+    }
+    tlsph_fill f = good_fill();
+    CHECK_RESULT(tlsph_cloud_create(NULL, NULL, NULL), TLSPH_ERROR_ARGUMENT);
+    CHECK_RESULT(tlsph_cloud_create(&f, NULL, NULL), TLSPH_ERROR_ARGUMENT);
+    tlsph_cloud_destroy(NULL);
+}
+TEST(every_argument_of_voronoi_is_checked)
+{
+    static const tlsph_real X[3] = {R(0.5), R(0.5), 0};
+    for (int i = 0; i < 9; i++) {
+        tlsph_particles p;
+        tlsph_surface surface = {4, square};
+        tlsph_real V[1], B[3];
+        memset(&p, 0, sizeof p);
+        p.count = i == 6 ? 0 : 1;
+        p.positions = i == 5 ? NULL : X;
+        p.spacing = R(i == 7 ? 0 : 1);
+        const tlsph_result result =
+            tlsph_voronoi(i == 3 ? 1 : i == 4 ? 4 : 2, i == 0 ? NULL : &p, i == 1 ? NULL : &surface, NULL, i == 2 ? NULL : V,
+                          i == 8 ? NULL : B, NULL);
+        CHECK_RESULT(result, TLSPH_ERROR_ARGUMENT);
+    }
+}
+TEST(every_argument_of_reproduce_is_checked)
+{
+    static const tlsph_real X[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, radii[3] = {3, 3, 3}, x[3] = {R(0.3), R(0.3), 0};
+    tlsph_real value[3];
+    const tlsph_shape_functions out = {value, NULL, NULL, NULL};
+    static const int wrong[4][2] = {{0, 1}, {4, 1}, {2, 0}, {2, 3}};
+    tlsph_nodes nodes = {2, 1, TLSPH_QUADRATIC, 3, X, radii};
+    CHECK_RESULT(tlsph_reproduce(&nodes, x, &out, NULL), TLSPH_OK);
+    for (int i = 0; i < 4; i++) {
+        nodes.dimension = wrong[i][0];
+        nodes.order = wrong[i][1];
+        CHECK_RESULT(tlsph_reproduce(&nodes, x, &out, NULL), TLSPH_ERROR_DESCRIPTION);
+    }
+    nodes.dimension = nodes.order = 2; /* six monomials, three nodes */
+    CHECK_RESULT(tlsph_reproduce(&nodes, x, &out, NULL), TLSPH_ERROR_NEIGHBOURS);
+}
+/* Without a spacing it is that of the mean weight; local ones count if they are given. */
+TEST(spacing_follows_from_weights)
+{
+    small_scene s;
+    tlsph_size given, found;
+    REQUIRE(small_scene_make(&s));
+    REQUIRE_OK(tlsph_measure(&s.desc, &given, NULL));
+    s.desc.particles.spacing = 0;
+    REQUIRE_OK(tlsph_measure(&s.desc, &found, NULL));
+    CHECK_SAME(found.pairs, given.pairs);
+    tlsph_real *spacings = malloc(s.desc.particles.count * sizeof *spacings);
+    REQUIRE(spacings);
+    for (size_t a = 0; a < s.desc.particles.count; a++) spacings[a] = R(0.5);
+    s.desc.particles.spacings = spacings;
+    REQUIRE_OK(tlsph_measure(&s.desc, &found, NULL));
+    CHECK_SAME(found.pairs, given.pairs);
+    free(spacings);
+    own_cloud_destroy(&s.cloud);
+}
+
 /* ---- rounding modes and denormals ---- */
 
 /* A free block that moves, turns and conducts heat: momenta and energy stay as they were, to round-off. */
@@ -299,5 +421,7 @@ TEST(balances_with_denormals_flushed)
 
 SUITE(limits, ENTRY(counts_near_the_limits), ENTRY(numbers_near_the_limits), ENTRY(given_lists_near_the_limits),
       ENTRY(lattices_near_the_limits), ENTRY(surfaces_near_the_limits), ENTRY(normals_and_lengths_near_the_limits),
-      ENTRY(forged_checkpoints_are_undone), ENTRY(balances_in_every_rounding_mode),
+      ENTRY(forged_checkpoints_are_undone), ENTRY(every_field_says_whether_it_can_be_written),
+      ENTRY(every_entry_of_a_fill_is_checked), ENTRY(every_argument_of_voronoi_is_checked),
+      ENTRY(every_argument_of_reproduce_is_checked), ENTRY(spacing_follows_from_weights), ENTRY(balances_in_every_rounding_mode),
       ENTRY(balances_with_denormals_flushed))
