@@ -43,7 +43,7 @@ toolchain() {
         skip "$name" "$compiler $flags makes no program that runs"
         return
     fi
-    if compile "$name" "$compiler" "$flags" && $compiler $flags "$work/$name"/*.o -lm -o "$work/$name/tests" \
+    if compile "$name" "$compiler" "$flags" && $compiler $flags "$work/$name"/*.o -lm -lpthread -o "$work/$name/tests" \
         >> "$work/$name/log" 2>&1 && $runner "$work/$name/tests" $filters > "$work/$name/out" 2>&1; then
         echo "ok    $name: $(tail -n 1 "$work/$name/out" | tr -d '\r')$(grep -q 'warning:' "$work/$name/log" && echo ", warnings")"
         passed=$((passed + 1))
