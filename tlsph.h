@@ -881,8 +881,11 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #else
 #define TLSPHI_UNROLL
 #endif
-/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. */
+/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. clang complains
+   where it is told not to optimise and so does not make vectors of them. */
 #if defined(__clang__)
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
 #define TLSPHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #elif defined(__GNUC__) && __GNUC__ >= 8
 #define TLSPHI_EACH_LANE _Pragma("GCC ivdep")
@@ -5290,46 +5293,76 @@ TLSPHI_INLINE void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
     for (int i = 0; i < dim; i++) out[i] = (double)v[i];
 }
 
+/* Arms X of the particles [begin, end) of a tile, and their volumes, as lanes; 0 where the tile has no particle. */
+typedef struct tlsphi_arms {
+    double X[3][TLSPHI_LANES_MOST], V[TLSPHI_LANES_MOST], f[3][TLSPHI_LANES_MOST];
+} tlsphi_arms;
+
+TLSPHI_INLINE void tlsphi_take_arms(const tlsphi_projection *p, const double origin[3], size_t begin, size_t end,
+                                    tlsphi_arms *out) {
+    const tlsph_solver *s = p->s;
+    const size_t D = (size_t)s->dim, base = begin / TLSPHI_LANES * TLSPHI_LANES;
+    const tlsph_real *x = s->linear ? s->X : s->now.x;
+    memset(out, 0, sizeof *out);
+    for (size_t a = begin; a < end; a++) out->V[a - base] = (double)s->V[a];
+    for (size_t i = 0; i < D; i++) {
+        if (s->linear || !p->stage.ahead)
+            for (size_t a = begin; a < end; a++) out->X[i][a - base] = (double)x[D * a + i] - origin[i];
+        else
+            for (size_t a = begin; a < end; a++)
+                out->X[i][a - base] = tlsphi_next_position(s, &p->stage, p->dt, D * a + i) - origin[i];
+    }
+}
+/* A vector field of the same particles. */
+TLSPHI_INLINE void tlsphi_take_arrows(const tlsph_real *f, size_t D, size_t begin, size_t end, tlsphi_arms *out) {
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
+    for (size_t i = 0; i < D; i++)
+        for (size_t a = begin; a < end; a++) out->f[i][a - base] = (double)f[D * a + i];
+}
+/* Sums of V, V X, V X X (6), V f, V X x f, lane by lane. */
+TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, double (*m)[TLSPHI_LANES_MOST]) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const double V = u->V[l], X[3] = {u->X[0][l], u->X[1][l], u->X[2][l]}, f[3] = {u->f[0][l], u->f[1][l], u->f[2][l]};
+        double Xf[3];
+        tlsphi_cross3(X, f, Xf);
+        m[0][l] += V;
+        TLSPHI_UNROLL for (int k = 0; k < 3; k++) {
+            m[1 + k][l] += V * X[k];
+            m[4 + k][l] += V * X[k] * X[k];
+            m[7 + k][l] += V * X[(k + 1) % 3] * X[(k + 2) % 3];
+            m[10 + k][l] += V * f[k];
+            m[13 + k][l] += V * Xf[k];
+        }
+    }
+}
+/* Moments of a vector field over a block: its lanes are added in order at the end. */
+static void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const tlsph_real *field) {
+    double m[TLSPHI_MOMENTS][TLSPHI_LANES_MOST], origin[3];
+    tlsphi_arms arms;
+    memset(m, 0, sizeof m);
+    tlsphi_projection_origin(p, block, origin);
+    for (size_t begin = block->begin, end; begin < block->end; begin = end) {
+        end = tlsphi_tile_end(block, begin);
+        tlsphi_take_arms(p, origin, begin, end, &arms);
+        tlsphi_take_arrows(field, (size_t)p->s->dim, begin, end, &arms);
+        tlsphi_add_arms(&arms, m);
+    }
+    for (int k = 0; k < TLSPHI_MOMENTS; k++) {
+        block->moments[k] = 0;
+        for (size_t l = 0; l < TLSPHI_LANES; l++) block->moments[k] += m[k][l];
+    }
+}
 /* Sums of V | V X | V X X (6) | V v | V X x v over a block. */
 static void tlsphi_rigid_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
-    const tlsph_solver *s = p->s;
-    tlsphi_block *block = p->s->block + i;
-    double *m = block->moments, origin[3], X[3], v[3], Xv[3];
-    memset(block->moments, 0, sizeof block->moments);
-    tlsphi_projection_origin(p, block, origin);
-    for (size_t a = block->begin; a < block->end; a++) {
-        const double V = (double)s->V[a];
-        tlsphi_projection_arm(p, origin, a, X);
-        tlsphi_vector3(s->v + (size_t)s->dim * a, s->dim, v);
-        tlsphi_cross3(X, v, Xv);
-        m[0] += V;
-        for (int k = 0; k < 3; k++) {
-            m[1 + k] += V * X[k];
-            m[4 + k] += V * X[k] * X[k];
-            m[7 + k] += V * X[(k + 1) % 3] * X[(k + 2) % 3];
-            m[10 + k] += V * v[k];
-            m[13 + k] += V * Xv[k];
-        }
-    }
+    tlsphi_block_moments(p, p->s->block + i, p->s->v);
 }
 /* Sums of T | X x T over a block. */
 static void tlsphi_torque_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
-    const tlsph_solver *s = p->s;
     tlsphi_block *block = p->s->block + i;
-    double *m = block->moments, origin[3], X[3], T[3], XT[3];
-    memset(block->moments, 0, sizeof block->moments);
-    tlsphi_projection_origin(p, block, origin);
-    for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_projection_arm(p, origin, a, X);
-        tlsphi_vector3(s->rate_p + (size_t)s->dim * a, s->dim, T);
-        tlsphi_cross3(X, T, XT);
-        for (int k = 0; k < 3; k++) {
-            m[k] += (double)s->V[a] * T[k];
-            m[3 + k] += (double)s->V[a] * XT[k];
-        }
-    }
+    tlsphi_block_moments(p, block, p->s->rate_p);
+    for (int k = 0; k < 6; k++) block->moments[k] = block->moments[10 + k];
 }
 /* x with I x = moment, within the turns that the body's mirror planes allow. */
 static void tlsphi_turn(const tlsphi_body *body, const double moment[3], double x[3]) {
@@ -5380,6 +5413,15 @@ static void tlsphi_pay_debt(tlsphi_body *body, const double *m) {
     tlsphi_multipliers(body, left);
     memset(body->debt, 0, sizeof body->debt);
 }
+/* turn x X + shift of each lane, to f. */
+TLSPHI_INLINE void tlsphi_rigid_lanes(const double turn[3], const double shift[3], tlsphi_arms *u) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const double X[3] = {u->X[0][l], u->X[1][l], u->X[2][l]};
+        double out[3];
+        tlsphi_cross3(turn, X, out);
+        TLSPHI_UNROLL for (int k = 0; k < 3; k++) u->f[k][l] = out[k] + shift[k];
+    }
+}
 /* w = v - rigid motion. */
 static void tlsphi_relative_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
@@ -5387,14 +5429,19 @@ static void tlsphi_relative_task(void *arg, size_t i) {
     const tlsphi_block *block = s->block + i;
     const tlsphi_body *body = s->body + block->body;
     const size_t D = (size_t)s->dim;
-    double centre[3], X[3], turn[3];
+    double centre[3];
+    tlsphi_arms arms;
     tlsphi_projection_centre(p, block, centre);
-    for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_projection_arm(p, centre, a, X);
-        tlsphi_cross3(body->spin, X, turn);
-        for (size_t k = 0; k < D; k++)
-            tlsphi_at(s, s->rows.w, a)[k * TLSPHI_ROW] =
-                (tlsph_real)((double)s->v[D * a + k] - body->v_mean[k] - turn[k]);
+    for (size_t begin = block->begin, end; begin < block->end; begin = end) {
+        end = tlsphi_tile_end(block, begin);
+        tlsphi_take_arms(p, centre, begin, end, &arms);
+        tlsphi_rigid_lanes(body->spin, body->v_mean, &arms);
+        for (size_t k = 0; k < D; k++) {
+            const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
+            tlsph_real *w = tlsphi_at(s, s->rows.w + (int)k, base);
+            for (size_t a = begin; a < end; a++)
+                w[a - base] = (tlsph_real)((double)s->v[D * a + k] - arms.f[k][a - base]);
+        }
     }
 }
 static void tlsphi_correct_task(void *arg, size_t i) {
@@ -5403,12 +5450,15 @@ static void tlsphi_correct_task(void *arg, size_t i) {
     const tlsphi_block *block = s->block + i;
     const tlsphi_body *body = s->body + block->body;
     const size_t D = (size_t)s->dim;
-    double centre[3], X[3], turn[3];
+    double centre[3];
+    tlsphi_arms arms;
     tlsphi_projection_centre(p, block, centre);
-    for (size_t a = block->begin; a < block->end; a++) {
-        tlsphi_projection_arm(p, centre, a, X);
-        tlsphi_cross3(body->lambda, X, turn);
-        for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += (tlsph_real)(turn[k] + body->linear[k]);
+    for (size_t begin = block->begin, end; begin < block->end; begin = end) {
+        end = tlsphi_tile_end(block, begin);
+        tlsphi_take_arms(p, centre, begin, end, &arms);
+        tlsphi_rigid_lanes(body->lambda, body->linear, &arms);
+        for (size_t a = begin; a < end; a++)
+            for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += (tlsph_real)arms.f[k][a % TLSPHI_LANES];
     }
 }
 /* Sums of z x T over a block. */
@@ -10281,6 +10331,9 @@ TLSPHI_DEF void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const
     }
 }
 
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
 #endif /* TLSPH_IMPLEMENTATION_DONE */
 #endif /* TLSPH_IMPLEMENTATION */
 
