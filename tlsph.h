@@ -1395,7 +1395,8 @@ typedef struct tlsphi_graph {
     size_t *first; /* slot of each tile; tiles in the order of the blocks */
     tlsphi_slot *slot;
     uint32_t *gathered;
-    tlsph_real *pattern; /* (D + 1) x lanes each */
+    int width;           /* D + 1; D + 2 with C_ab . d_ab, which compact conduction needs where C is not g */
+    tlsph_real *pattern; /* width x lanes each */
 } tlsphi_graph;
 
 typedef struct tlsphi_scratch {
@@ -4237,7 +4238,7 @@ TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_bloc
     memset(&sum, 0, sizeof sum);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
-        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)(dim + 1) * TLSPHI_LANES;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
         const tlsph_real *b = tlsphi_gather(s, block, graph, slot, 0, with_w ? 2 * dim : dim);
         if (slot->scattered && with_S) tlsphi_gather(s, block, graph, slot, s->rows.S, s->rows.S + 1);
         if (slot->scattered && with_theta) tlsphi_gather(s, block, graph, slot, s->rows.theta, s->rows.theta + 1);
@@ -4658,13 +4659,21 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
    on lattices h/J |c|^2/(C.d), which is unbounded in clouds, where C may be nearly perpendicular to d.
    Where one neighbour is more than twice as hot as the other, the products Q_a theta_b/theta_a of the double gradient are
    larger than any flux, and unstable; there the two-point flux stands alone. */
+/* C.d, by two sides */
+TLSPHI_INLINE tlsph_real tlsphi_along(const tlsphi_heat_side *a, const tlsphi_heat_side *b, const tlsph_real *C,
+                                      const int dim) {
+    tlsph_real d[3] = {0};
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = b->X[i] - a->X[i];
+    return tlsphi_dot(dim, C, d);
+}
+/* CC = |C|^2, along = C.d */
 typedef struct tlsphi_pair_of_heat {
     tlsph_real heat, source, conduction;
 } tlsphi_pair_of_heat;
 
 TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat_side *b, const tlsph_real *g,
-                                    const tlsph_real *C, const tlsph_real *rest, const int dim, int thermal,
-                                    const int compact, tlsphi_pair_of_heat *out) {
+                                    tlsph_real CC, tlsph_real along, const tlsph_real *rest, const int dim,
+                                    int thermal, const int compact, tlsphi_pair_of_heat *out) {
     tlsph_real q_a = tlsphi_dot(dim, a->heat, g), q_b = tlsphi_dot(dim, b->heat, g);
     if (rest) {
         q_a += tlsphi_dot(dim, a->heat, rest);
@@ -4680,13 +4689,13 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat
     if (!compact) return;
     tlsph_real d[3] = {0}, c_a[3] = {0}, c_b[3] = {0};
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = b->X[i] - a->X[i];
-    const tlsph_real Cd = tlsphi_max(tlsphi_dot(dim, C, d), 0);
+    const tlsph_real Cd = tlsphi_max(along, 0);
     const tlsph_real slope = (tlsphi_dot(dim, a->slope, d) + tlsphi_dot(dim, b->slope, d)) / 2;
     const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = front ? D_theta : limited;
     tlsphi_multiply(dim, a->A, g, c_a);
     tlsphi_multiply(dim, b->A, g, c_b);
     const tlsph_real k = (a->h_J * tlsphi_dot(dim, c_a, c_a) + b->h_J * tlsphi_dot(dim, c_b, c_b)) * Cd /
-                         (2 * tlsphi_dot(dim, C, C) * tlsphi_dot(dim, d, d) + TLSPHI_TINY);
+                         (2 * CC * tlsphi_dot(dim, d, d) + TLSPHI_TINY);
     const tlsph_real into = k * jump;
     out->heat += into / (thermal == TLSPH_ENERGY ? one : a->theta);
     out->conduction = into * D_theta / (2 * a->theta * b->theta + TLSPHI_TINY);
@@ -4722,7 +4731,8 @@ TLSPHI_INLINE void tlsphi_add_stress(const tlsph_solver *s, size_t a, size_t k, 
     tlsphi_pair_of_heat heat;
     tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), dim, &side_a);
     tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), dim, &side_b);
-    tlsphi_pair_heat(&side_a, &side_b, g, C, rest, dim, s->thermal, s->conduction == TLSPH_COMPACT, &heat);
+    tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
+                     s->thermal, s->conduction == TLSPH_COMPACT, &heat);
     sum->heat += heat.heat;
     sum->source += heat.source;
     sum->conduction += heat.conduction;
@@ -4799,7 +4809,7 @@ TLSPHI_INLINE void tlsphi_stress_lanes(const tlsphi_rows *r, const tlsph_real *a
 }
 TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
                                      const tlsph_real *pattern, const int dim, int thermal, const int compact,
-                                     tlsphi_lane_sums *sum) {
+                                     const int given, tlsphi_lane_sums *sum) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_heat_side side_a, side_b;
         tlsphi_pair_of_heat heat;
@@ -4807,7 +4817,9 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
         tlsphi_load_heat(r, a + l, dim, &side_a);
         tlsphi_load_heat(r, b + l, dim, &side_b);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
-        tlsphi_pair_heat(&side_a, &side_b, g, g, NULL, dim, thermal, compact, &heat);
+        const tlsph_real C = pattern[(size_t)dim * TLSPHI_LANES + l];
+        const tlsph_real along = given ? pattern[(size_t)(dim + 1) * TLSPHI_LANES + l] : tlsphi_along(&side_a, &side_b, g, dim);
+        tlsphi_pair_heat(&side_a, &side_b, g, C * C, along, NULL, dim, thermal, compact, &heat);
         sum->heat[l] += heat.heat;
         sum->source[l] += heat.source;
         sum->conduction[l] += heat.conduction;
@@ -4850,11 +4862,12 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
     const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
-        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)(dim + 1) * TLSPHI_LANES;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
         const tlsph_real *b = tlsphi_gather(s, block, graph, slot, r.w, rows);
         if (parts & TLSPHI_STRESSES) tlsphi_stress_lanes(&r, a, b, g, dim, sum);
-        if (heats && s->conduction == TLSPH_COMPACT) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, sum);
-        else if (heats) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 0, sum);
+        if (heats && s->conduction != TLSPH_COMPACT) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 0, 0, sum);
+        else if (heats && s->M) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 1, sum);
+        else if (heats) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 0, sum);
         if (parts & TLSPHI_DAMPING) {
             tlsphi_lane_sums flux;
             if (tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 0, s->jump_share, &flux))
@@ -6007,7 +6020,8 @@ TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
             C = skew;
         }
         tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), dim, &side_b);
-        tlsphi_pair_heat(&side_a, &side_b, g, C, rest, dim, TLSPH_ENERGY, s->conduction == TLSPH_COMPACT, &heat);
+        tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
+                         TLSPH_ENERGY, s->conduction == TLSPH_COMPACT, &heat);
         sum.heat += heat.heat;
         sum.source += heat.source;
         sum.conduction += heat.conduction;
@@ -7200,11 +7214,11 @@ typedef struct tlsphi_tiler {
     size_t count[TLSPHI_LANES_MOST], most;
     uint32_t *list;           /* lanes x most */
     double *g;                /* lanes x most x D */
-    tlsph_real *size;         /* lanes x most: |C_ab| */
+    tlsph_real *size, *along; /* lanes x most: |C_ab|, C_ab . d_ab */
     uint8_t *done;            /* lanes x most */
     size_t slot_room, pattern_room, gather_room;
     uint32_t *seen; /* hash table of patterns, number + 1 */
-    tlsph_real pattern[4 * TLSPHI_LANES_MOST];
+    tlsph_real pattern[5 * TLSPHI_LANES_MOST];
 } tlsphi_tiler;
 
 /* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
@@ -7252,7 +7266,12 @@ static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         else tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, C);
         double size = sqrt(tlsphi_norm2(C));
         if (plan->correction) tlsphi_round_vectors(plan, &size, 1);
+        double d[3], along;
+        tlsphi_difference(plan, h, plan->host[list[i]], d);
+        along = tlsphi_dot3(C, d) / plan->h;
+        if (plan->correction) tlsphi_round_vectors(plan, &along, 1);
         t->size[lane * t->most + i] = (tlsph_real)size;
+        t->along[lane * t->most + i] = (tlsph_real)(along * plan->h);
         for (size_t k = 0; k < D && plan->antisymmetric; k++) g[D * i + k] = C[k];
     }
     t->count[lane] = count;
@@ -7260,7 +7279,7 @@ static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
 /* Number of the pattern in t->pattern; TLSPHI_NONE if there is no memory. */
 static uint32_t tlsphi_tile_pattern(tlsphi_tiler *t) {
     tlsphi_graph *graph = t->graph;
-    const size_t reals = (size_t)(t->plan->dim + 1) * TLSPHI_LANES, bytes = reals * sizeof *t->pattern;
+    const size_t reals = (size_t)graph->width * TLSPHI_LANES, bytes = reals * sizeof *t->pattern;
     const uint64_t hash = tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)(const void *)t->pattern, bytes);
     size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
     for (int probe = 0; probe < 8 && t->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
@@ -7276,6 +7295,7 @@ static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
     t->done[at] = 1;
     for (size_t k = 0; k < D; k++) t->pattern[k * TLSPHI_LANES + lane] = (tlsph_real)t->g[D * at + k];
     t->pattern[D * TLSPHI_LANES + lane] = t->size[at];
+    if (t->graph->width == t->plan->dim + 2) t->pattern[(D + 1) * TLSPHI_LANES + lane] = t->along[at];
 }
 /* Closes a slot: the pattern is set; `from` is the first neighbour, or, scattered, the place of the list. */
 static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
@@ -7350,15 +7370,17 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->plan = plan;
     t->damped = damped;
     t->graph = plan->graph + damped;
+    t->graph->width = plan->dim + (plan->desc->thermal && plan->desc->conduction == TLSPH_COMPACT && !plan->antisymmetric ? 2 : 1);
     t->most = plan->most;
     t->list = TLSPHI_SCRATCH(plan, uint32_t, all);
     t->g = TLSPHI_SCRATCH(plan, double, D * all);
     t->size = TLSPHI_SCRATCH(plan, tlsph_real, all);
+    t->along = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->done = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     for (size_t a = 0; a < n; a++) t->graph->tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
     t->graph->first = TLSPHI_SCRATCH(plan, size_t, t->graph->tiles + 1);
-    if (!t->list || !t->g || !t->size || !t->done || !t->seen || !t->graph->first)
+    if (!t->list || !t->g || !t->size || !t->along || !t->done || !t->seen || !t->graph->first)
         return tlsphi_no_memory(plan, 64.0 * (double)all);
     for (size_t tile = 0; t->end < n; tile++) {
         t->begin = t->end;
@@ -7479,8 +7501,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->rows.lap_p = s->rows.count;
         s->rows.count += s->dim;
     }
-    s->lanes = s->dissipation == TLSPH_LIMITED && !s->bonds && !s->audit && !s->metal &&
-               !(s->conducts && s->corrected && s->conduction == TLSPH_COMPACT);
+    s->lanes = s->dissipation == TLSPH_LIMITED && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
@@ -7572,12 +7593,12 @@ static void tlsphi_layout_loads(tlsph_solver *s, tlsphi_arena *arena, const tlsp
         if (s->load && !arena->overflow) s->load[at++] = load;
     }
 }
-static void tlsphi_layout_graph(tlsphi_arena *arena, int dim, const tlsphi_graph *plan, tlsphi_graph *out) {
+static void tlsphi_layout_graph(tlsphi_arena *arena, const tlsphi_graph *plan, tlsphi_graph *out) {
     *out = *plan;
     out->first = TLSPHI_TAKE(arena, size_t, plan->tiles + 1);
     out->slot = TLSPHI_TAKE(arena, tlsphi_slot, plan->slots);
     out->gathered = TLSPHI_TAKE(arena, uint32_t, plan->gathers * TLSPHI_LANES);
-    out->pattern = TLSPHI_TAKE(arena, tlsph_real, plan->patterns * (size_t)(dim + 1) * TLSPHI_LANES);
+    out->pattern = TLSPHI_TAKE(arena, tlsph_real, plan->patterns * (size_t)plan->width * TLSPHI_LANES);
 }
 /* Gives every array its place. Called twice: without memory to count, then with it. */
 static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_plan *plan) {
@@ -7614,8 +7635,8 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->image = TLSPHI_TAKE(arena, tlsphi_image, s->images);
     if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
-    tlsphi_layout_graph(arena, s->dim, plan->graph, &s->graph);
-    if (plan->lattice) tlsphi_layout_graph(arena, s->dim, plan->graph + 1, &s->damped_graph);
+    tlsphi_layout_graph(arena, plan->graph, &s->graph);
+    if (plan->lattice) tlsphi_layout_graph(arena, plan->graph + 1, &s->damped_graph);
     else s->damped_graph = s->graph;
     s->size.bytes_per_pair = (arena->used - before_pairs - (n + 1) * sizeof(size_t)) / (s->pairs ? s->pairs : 1);
     s->size.bytes = arena->used + 63;
@@ -7640,12 +7661,12 @@ static void tlsphi_fill_blocks(tlsph_solver *s, const tlsphi_plan *plan) {
         block->end = (uint32_t)(a + 1);
     }
 }
-static void tlsphi_fill_graph(const tlsphi_graph *plan, int dim, tlsphi_graph *out) {
+static void tlsphi_fill_graph(const tlsphi_graph *plan, tlsphi_graph *out) {
     memcpy(out->first, plan->first, (plan->tiles + 1) * sizeof *plan->first);
     if (plan->slots) memcpy(out->slot, plan->slot, plan->slots * sizeof *plan->slot);
     if (plan->gathers) memcpy(out->gathered, plan->gathered, plan->gathers * TLSPHI_LANES * sizeof *plan->gathered);
     if (plan->patterns)
-        memcpy(out->pattern, plan->pattern, plan->patterns * (size_t)(dim + 1) * TLSPHI_LANES * sizeof *plan->pattern);
+        memcpy(out->pattern, plan->pattern, plan->patterns * (size_t)plan->width * TLSPHI_LANES * sizeof *plan->pattern);
 }
 static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
     const size_t D = (size_t)s->dim;
@@ -7901,8 +7922,8 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
         s->materials[i].c_linear = tlsphi_sqrt(TLSPHI_R(4.0 / 3.0) * s->materials[i].mu / m->density);
     }
     tlsphi_fill_blocks(s, plan);
-    tlsphi_fill_graph(plan->graph, s->dim, &s->graph);
-    if (plan->lattice) tlsphi_fill_graph(plan->graph + 1, s->dim, &s->damped_graph);
+    tlsphi_fill_graph(plan->graph, &s->graph);
+    if (plan->lattice) tlsphi_fill_graph(plan->graph + 1, &s->damped_graph);
     TLSPH_ASSERT(s->block[s->blocks - 1].end == s->n);
     tlsphi_fill_particles(s, plan);
     tlsphi_fill_pairs(s, plan, list, g);

@@ -131,13 +131,12 @@ static int by_address(const void *a, const void *b) {
 }
 
 /* Of names for one array the last counts. */
-#define ARRAYS(EACH)                                                    \
-    EACH(materials) EACH(material_of) EACH(block) EACH(body) EACH(host) EACH(inner) EACH(X) EACH(V) EACH(B)           \
-    EACH(tau) EACH(now_memory) EACH(old_memory) EACH(rate_p) EACH(w) EACH(v) EACH(P_flux) EACH(PM) EACH(slope_w)      \
-    EACH(grad_w) EACH(grad_v) EACH(rate_F) EACH(rate_J) EACH(rate_E) EACH(A) EACH(wave) EACH(held) EACH(S)            \
-    EACH(grad_S) EACH(theta) EACH(grad_theta) EACH(heat) EACH(h_J) EACH(M) EACH(fix) EACH(mirror)                     \
-    EACH(mirror_of) EACH(load) EACH(damped_first) EACH(first) EACH(damped_neighbour) EACH(neighbour)                  \
-    EACH(damped_g) EACH(g) EACH(image)
+#define ARRAYS(EACH)                                                                                                  \
+    EACH(materials) EACH(material_of) EACH(beside) EACH(block) EACH(body) EACH(host) EACH(inner) EACH(X) EACH(V)      \
+    EACH(B) EACH(tau) EACH(now_memory) EACH(old_memory) EACH(rate_p) EACH(v) EACH(row) EACH(grad_v) EACH(rate_F)      \
+    EACH(rate_J) EACH(rate_E) EACH(held) EACH(M) EACH(fix) EACH(mirror) EACH(mirror_of) EACH(load)                    \
+    EACH(damped_first) EACH(first) EACH(damped_neighbour) EACH(neighbour) EACH(damped_g) EACH(g) EACH(image)          \
+    EACH(graph.first) EACH(graph.slot) EACH(graph.gathered) EACH(graph.pattern)
 
 static void list_arrays(int n, tlsph_unknowns unknowns, tlsph_thermal thermal, const char *name, FILE *csv) {
     body b;
