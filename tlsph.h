@@ -912,7 +912,7 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_LARGEST 1e300 /* stands for "no bound" in reductions */
 #ifdef TLSPH_REAL_FLOAT
 #define TLSPHI_EPSILON 1.1920929e-7
-#define TLSPHI_TINY 1.17549435e-38f /* smallest normal number: added to divisors that may be 0 where the dividend is */
+#define TLSPHI_TINY 1.17549435e-38f /* smallest normal number: divisors that may be 0 where the dividend is are no less */
 #else
 #define TLSPHI_EPSILON 2.220446049250313e-16
 #define TLSPHI_TINY 2.2250738585072014e-308
@@ -957,8 +957,9 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
     return y;
 }
 /* x^(-1/2) and x^(1/2) in the same manner, for loops over lanes: sqrt must set errno, which no compiler can do for eight
-   numbers at once. A huge number for x = 0. */
-TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real x) {
+   numbers at once. A huge number for x = 0, but one whose square is finite. */
+TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real given) {
+    const tlsph_real least = 64 * TLSPHI_TINY, x = given > least ? given : least; /* half of it must not be flushed to 0 */
     tlsph_real y;
 #ifdef TLSPH_REAL_FLOAT
     uint32_t bits;
@@ -974,6 +975,11 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real x) {
     return y;
 }
 TLSPHI_INLINE tlsph_real tlsphi_square_root(tlsph_real x) { return x * tlsphi_inverse_root(x); }
+/* 1/x, or 0 for x = 0: lanes without a pair have nothing else than zeros, in whatever order a compiler multiplies them. */
+TLSPHI_INLINE tlsph_real tlsphi_inverse_or_0(tlsph_real x) {
+    const tlsph_real inverse = 1 / (x > TLSPHI_TINY ? x : TLSPHI_TINY);
+    return x > TLSPHI_TINY ? inverse : 0;
+}
 TLSPHI_INLINE int tlsphi_nan(tlsph_real x) { /* not finite, and not equal to infinity's bits */
     const tlsph_real infinity = (tlsph_real)HUGE_VAL, minus = -infinity;
     return !tlsphi_finite(x) && memcmp(&x, &infinity, sizeof x) != 0 && memcmp(&x, &minus, sizeof x) != 0;
@@ -4052,7 +4058,7 @@ TLSPHI_INLINE tlsph_real tlsphi_front(tlsph_real raw, tlsph_real slope_a, tlsph_
 /* S_J (000-73) times the share a_J, weakened where the drift potential is stiff; cc = |c|^2, CC = |C|. */
 TLSPHI_INLINE tlsph_real tlsphi_jacobian_factor(tlsph_real a_J, tlsph_real cc, tlsph_real CC, tlsph_real rho,
                                                 tlsph_real c_p, tlsph_real mean_ratio) {
-    return a_J * cc / (2 * rho * c_p * CC * (1 + mean_ratio) + TLSPHI_TINY); /* 0 where C is */
+    return a_J * cc * tlsphi_inverse_or_0(2 * rho * c_p * CC * (1 + mean_ratio)); /* 0 where C is */
 }
 
 /* (66) and (76), with x/(x^2 + 1e-12) for 1/x where the temperatures meet. */
@@ -4592,7 +4598,7 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsphi_damp_side *a, const tlsphi
         Dv[i] = b->w[i] - a->w[i];
         Dr[i] = Dv[i] - (Gd_a[i] + Gd_b[i]) / 2;
     }
-    const tlsph_real cc = tlsphi_dot(dim, c, c), inverse = 1 / (cc + TLSPHI_TINY);
+    const tlsph_real cc = tlsphi_dot(dim, c, c), inverse = tlsphi_inverse_or_0(cc);
     const tlsph_real rho = (a->rho + b->rho) / 2, share = metal ? tlsphi_square_root(cc) / (2 * CC) : TLSPHI_R(0.5);
     const tlsph_real c_p = (a->c_p + b->c_p) * share, c_s = (a->c_s + b->c_s) * share;
     const tlsph_real raw = tlsphi_dot(dim, c, Dv), low = TLSPHI_R(TLSPHI_FRONT_LOW) * c_p;
@@ -4694,11 +4700,11 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat
     const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = front ? D_theta : limited;
     tlsphi_multiply(dim, a->A, g, c_a);
     tlsphi_multiply(dim, b->A, g, c_b);
-    const tlsph_real k = (a->h_J * tlsphi_dot(dim, c_a, c_a) + b->h_J * tlsphi_dot(dim, c_b, c_b)) * Cd /
-                         (2 * CC * tlsphi_dot(dim, d, d) + TLSPHI_TINY);
+    const tlsph_real k = (a->h_J * tlsphi_dot(dim, c_a, c_a) + b->h_J * tlsphi_dot(dim, c_b, c_b)) * Cd *
+                         tlsphi_inverse_or_0(2 * CC * tlsphi_dot(dim, d, d));
     const tlsph_real into = k * jump;
     out->heat += into / (thermal == TLSPH_ENERGY ? one : a->theta);
-    out->conduction = into * D_theta / (2 * a->theta * b->theta + TLSPHI_TINY);
+    out->conduction = into * D_theta * tlsphi_inverse_or_0(2 * a->theta * b->theta);
 }
 
 /* Audit: the pair's production over the size of its terms must not be negative beyond round-off. */
