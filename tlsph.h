@@ -7272,7 +7272,7 @@ static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         else tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, C);
         double size = sqrt(tlsphi_norm2(C));
         if (plan->correction) tlsphi_round_vectors(plan, &size, 1);
-        double d[3], along;
+        double d[3] = {0, 0, 0}, along;
         tlsphi_difference(plan, h, plan->host[list[i]], d);
         along = tlsphi_dot3(C, d) / plan->h;
         if (plan->correction) tlsphi_round_vectors(plan, &along, 1);
