@@ -5371,12 +5371,12 @@ static void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block
         for (size_t l = 0; l < TLSPHI_LANES; l++) block->moments[k] += m[k][l];
     }
 }
-/* Sums of V | V X | V X X (6) | V v | V X x v over a block. */
+/* Moments of v. */
 static void tlsphi_rigid_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
     tlsphi_block_moments(p, p->s->block + i, p->s->v);
 }
-/* Sums of T | X x T over a block. */
+/* Sums of T | X x T, from the same moments. */
 static void tlsphi_torque_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
     tlsphi_block *block = p->s->block + i;
