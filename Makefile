@@ -115,10 +115,8 @@ build/suites.h: FORCE
 QUICK := $(filter-out physics%,$(TOPICS))
 SKIPPED = echo "$(1)"; echo "0 passed, 0 failed, 1 skipped"
 FAST_STEPS := "build/test_double" "build/test_float" "CC='$(CC)' sh tests/header.sh"
-FAST_MATH := errors/ limits/ cells4/ physics_balances/ physics_invariance/ physics_integrators/ physics_loads/ \
-  physics_incompressible/
 SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
-SLOW_STEPS := "build/test_double --slow" "build/test_fast_math $(FAST_MATH)" \
+SLOW_STEPS := "build/test_double --slow" "build/test_fast_math" \
   $(if $(THREAD_SANITIZE),"build/test_threads embedding/","$(call SKIPPED,no thread sanitizer)") \
   $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
     "$(call SKIPPED,no sanitizers)") \

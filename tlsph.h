@@ -6117,14 +6117,14 @@ static void tlsphi_super_task(void *arg, size_t i) {
     const tlsphi_super_stage *stage = (const tlsphi_super_stage *)arg;
     tlsph_solver *s = stage->s;
     tlsphi_super *y = &s->super;
-    const tlsph_real rest = 1 - stage->mu - stage->nu;
     for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
         if (stage->number == 1) {
             y->first[a] = y->previous[a] = y->current[a] = (*tlsphi_theta(s, a));
             y->rate[a] = s->rate_E[a];
         }
-        const tlsph_real next = stage->mu * y->current[a] + stage->nu * y->previous[a] + rest * y->first[a] +
-                                stage->now * s->rate_E[a] + stage->then * y->rate[a];
+        const tlsph_real was = y->first[a]; /* in changes: the weights add up to 1 only but for rounding, which made heat */
+        const tlsph_real next = was + (stage->mu * (y->current[a] - was) + stage->nu * (y->previous[a] - was) +
+                                       stage->now * s->rate_E[a] + stage->then * y->rate[a]);
         y->previous[a] = y->current[a];
         y->current[a] = (*tlsphi_theta(s, a)) = next;
     }

@@ -10,6 +10,12 @@
 /* A tolerance `relative` in double, and `epsilons` machine epsilons where these are more (in float). */
 #define ROUNDED(relative, epsilons) fmax((relative), (epsilons) * EPSILON)
 
+/* The library's own flags (implementation.c): -ffast-math lets the compiler reorder. */
+int reorders(void);
+/* A tolerance for what depends on wave speeds. Their bounds are roots of differences that vanish where F is a rotation: to
+   the last digit by one order of operations, to half of the digits by any other. */
+#define BOUNDED(tolerance) (reorders() ? fmax((tolerance), 4 * sqrt(EPSILON)) : (tolerance))
+
 /* Deterministic random numbers; any seed. */
 double random_between(uint64_t *state, double low, double high);
 /* F = I + entries up to `amount`, with a positive determinant; a rotation about a random axis. */

@@ -8,7 +8,7 @@
 static double tolerance(tlsph_thermal thermal)
 {
     if (sizeof(tlsph_real) == 4) return 2e-3;
-    return thermal == TLSPH_ISOTHERMAL ? 2e-11 : 1e-8;
+    return BOUNDED(thermal == TLSPH_ISOTHERMAL ? 2e-11 : 1e-8);
 }
 
 static const tlsph_field compared[] = { TLSPH_FIELD_VELOCITY, TLSPH_FIELD_F, TLSPH_FIELD_H, TLSPH_FIELD_J,
