@@ -2405,8 +2405,8 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent, uint32_t *
    s0 = sum_b w. The volumes' slack leaves gradients of linear fields wrong by up to 2 % in a few particles, 0.2 % on average.
    Where there are more than 5 % anywhere, a second solution goes on from the first with a tenth of that slack; with
    `tight_closure` with a hundredth, which leaves 0.1 % and costs ten times as much, and waves are not the better for it.
-   What the iterations leave of sum C + B is at last taken away by l alone, a graph's Laplacian, so that inside the body
-   a uniform stress exerts no force but round-off.
+   What the iterations leave of sum C + B is at last taken away by l alone, a graph's Laplacian, after sum B (x) X was made
+   V I: a uniform stress exerts no force inside the body but round-off, and its tractions no torque.
    Conjugate gradients; preconditioner: the inverse of each particle's own (1 + D) x (1 + D) block, one for all components.
    In units of the largest spacing. w and d are rounded to float: that halves the memory to read and costs d 1e-7. */
 
@@ -2441,6 +2441,11 @@ typedef struct tlsphi_closer {
 #define TLSPHI_FOUR for (int j = 0; j < 4; j++)
 #endif
 
+/* out += S l, by which B_a shrinks */
+TLSPHI_INLINE void tlsphi_closure_slack(const double *slack, const double *l, double *out) {
+    const double along = tlsphi_dot3(slack, l);
+    for (int j = 0; j < 3; j++) out[j] += slack[j] * along + slack[6] * l[j];
+}
 /* q = K p for one particle; the sum of q.p. */
 TLSPHI_INLINE double tlsphi_closure_row(const tlsphi_closer *c, size_t a, const int rows) {
     const double *slack = c->slack[a], *from = c->p + 4 * (size_t)rows * a;
@@ -2456,8 +2461,7 @@ TLSPHI_INLINE double tlsphi_closure_row(const tlsphi_closer *c, size_t a, const 
         TLSPHI_FOUR y[j] += X[j];
         TLSPHI_UNROLL for (int l = 1; l < rows; l++) TLSPHI_FOUR y[4 * l + j] += X[j] * d[l];
     }
-    const double along = tlsphi_dot3(slack, pa);
-    for (int j = 0; j < 3; j++) y[j] += slack[j] * along + slack[6] * pa[j];
+    if (rows > 1) tlsphi_closure_slack(slack, pa, y);
     for (int k = 4; k < 4 * rows; k++) y[k] += slack[3] * pa[k];
     for (int k = 0; k < 4 * rows; k++) sum += (q[k] = y[k]) * pa[k];
     return sum;
@@ -2538,30 +2542,7 @@ static double tlsphi_closure_open(const tlsphi_closer *c, size_t i, size_t j) {
     const double B = j < D ? (double)c->plan->desc->particles.areas[3 * c->plan->grid.order[i] + j] : 0;
     return -B / pow(c->unit, (double)D - 1) - c->q[4 * c->rows * i + j];
 }
-/* The last word: l alone, packed into the memory of p. */
-static tlsph_result tlsphi_closure_balance(tlsphi_closer *c) {
-    tlsphi_closer packed = *c;
-    const size_t size = 4 * c->n;
-    double residual;
-    for (size_t i = 0; i < c->n; i++) {
-        double sum = 0;
-        for (size_t k = c->first[i]; k < c->first[i + 1]; k++) sum += (double)c->pair[k][0];
-        c->block[i][0] = (float)(1 / sum);
-    }
-    memcpy(c->p, c->x, c->rows * size * sizeof *c->p);
-    tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
-    for (size_t i = 0; i < size; i++) c->r[i] = tlsphi_closure_open(c, i / 4, i % 4);
-    packed.rows = 1;
-    packed.x = c->p;
-    packed.p = c->p + size;
-    packed.q = c->p + 2 * size;
-    memset(packed.x, 0, size * sizeof *packed.x);
-    const tlsph_result r = tlsphi_closure_iterate(&packed, TLSPHI_CLOSURE_BALANCE, &residual);
-    for (size_t i = 0; i < size; i++) c->x[c->rows * (i - i % 4) + i % 4] += packed.x[i];
-    return r;
-}
-
-/* Inverse of a symmetric positive matrix of size 3 or 4 by Gauss-Jordan without pivots. */
+/* Inverse of a symmetric positive matrix by Gauss-Jordan without pivots. */
 static void tlsphi_closure_invert(size_t n, double *A) {
     for (size_t k = 0; k < n; k++) {
         const double pivot = 1 / A[n * k + k];
@@ -2575,6 +2556,87 @@ static void tlsphi_closure_invert(size_t n, double *A) {
         }
     }
 }
+/* A uniform stress has no torque on a part where sum B (x) X = V I. What is missing for that goes into the lengths of its B,
+   V n (n.(y_0 + Y X)): D (D + 1) equations A y = R a part. */
+typedef struct tlsphi_closure_turn { double A[144], y[12]; } tlsphi_closure_turn;
+/* y = A^-1 y; A may lack directions, for instance the turns of a ball. */
+static void tlsphi_closure_turn_solve(tlsphi_closure_turn *t, size_t N) {
+    double y[12], most = 0;
+    for (size_t k = 0; k < N; k++) most = tlsphi_dmax(most, t->A[(N + 1) * k]);
+    for (size_t k = 0; k < N; k++) {
+        t->A[(N + 1) * k] += 1e-12 * most;
+        y[k] = t->y[k];
+    }
+    tlsphi_closure_invert(N, t->A);
+    for (size_t k = 0; k < N; k++) {
+        t->y[k] = 0;
+        for (size_t m = 0; m < N; m++) t->y[k] += t->A[N * k + m] * y[m];
+    }
+}
+/* Adds grid particle i to the equations of its part, around X0; or (apply) their solution to the residual. */
+static void tlsphi_closure_turn_add(tlsphi_closer *c, size_t i, const tlsph_real *X0, tlsphi_closure_turn *t, int apply) {
+    const size_t rows = c->rows, N = (rows - 1) * rows;
+    const tlsph_real *X = c->plan->desc->particles.positions + 3 * c->plan->grid.order[i];
+    const double *n = c->slack[i], volume = c->slack[i][5] / 2, nn = tlsphi_dot3(n, n);
+    double f[4] = {1, 0, 0, 0}, had[3] = {0, 0, 0}, along = 0;
+    for (size_t k = 1; k < rows; k++) f[k] = (double)(X[k - 1] - X0[k - 1]) / c->unit;
+    if (apply && nn > 0) {
+        for (size_t k = 0; k < N; k++) along += n[k / rows] * t->y[k] * f[k % rows];
+        for (size_t k = 0; k < 3; k++) c->r[4 * i + k] -= volume * along / nn * n[k];
+    }
+    if (apply) return;
+    tlsphi_closure_slack(c->slack[i], c->x + 4 * rows * i, had);
+    for (size_t k = 0; k < N; k++) {
+        const size_t j = k / rows;
+        t->y[k] += (c->r[4 * i + j] + c->q[4 * rows * i + j] - had[j]) * f[k % rows];
+        if (k % rows == j + 1) t->y[k] += volume;
+        for (size_t m = 0; nn > 0 && m < N; m++)
+            t->A[N * k + m] += volume / nn * n[j] * n[m / rows] * f[k % rows] * f[m % rows];
+    }
+}
+static tlsph_result tlsphi_closure_turn_all(tlsphi_closer *c, uint32_t *parent) {
+    const tlsph_real *X = c->plan->desc->particles.positions;
+    const size_t N = (c->rows - 1) * c->rows;
+    uint32_t *part = TLSPHI_SCRATCH(c->plan, uint32_t, c->n), parts = 0;
+    for (size_t a = 0; part && a < c->n; a++)
+        if (parent[a] == a) part[a] = parts++;
+    tlsphi_closure_turn *turn = TLSPHI_SCRATCH(c->plan, tlsphi_closure_turn, parts);
+    if (!part || !turn) return tlsphi_no_memory(c->plan, 1248.0 * parts + 4.0 * (double)c->n);
+    memset(turn, 0, parts * sizeof *turn);
+    for (int apply = 0; apply < 2; apply++) {
+        for (size_t i = 0; i < c->n; i++) {
+            const size_t root = tlsphi_root(parent, c->plan->grid.order[i]);
+            tlsphi_closure_turn_add(c, i, X + 3 * root, turn + part[root], apply);
+        }
+        for (uint32_t p = 0; !apply && p < parts; p++) tlsphi_closure_turn_solve(turn + p, N);
+    }
+    return TLSPH_OK;
+}
+/* The last word: l alone, packed into the memory of p. */
+static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent) {
+    tlsphi_closer packed = *c;
+    const size_t size = 4 * c->n;
+    double residual;
+    for (size_t i = 0; i < c->n; i++) {
+        double sum = 0;
+        for (size_t k = c->first[i]; k < c->first[i + 1]; k++) sum += (double)c->pair[k][0];
+        c->block[i][0] = (float)(1 / sum);
+    }
+    memcpy(c->p, c->x, c->rows * size * sizeof *c->p);
+    tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
+    for (size_t i = 0; i < size; i++) c->r[i] = tlsphi_closure_open(c, i / 4, i % 4);
+    const tlsph_result turned = tlsphi_closure_turn_all(c, parent);
+    if (turned) return turned;
+    packed.rows = 1;
+    packed.x = c->p;
+    packed.p = c->p + size;
+    packed.q = c->p + 2 * size;
+    memset(packed.x, 0, size * sizeof *packed.x);
+    const tlsph_result r = tlsphi_closure_iterate(&packed, TLSPHI_CLOSURE_BALANCE, &residual);
+    for (size_t i = 0; i < size; i++) c->x[c->rows * (i - i % 4) + i % 4] += packed.x[i];
+    return r;
+}
+
 /* Block and slack of grid particle i, and its start: m, row by row, into out. */
 static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double *out) {
     tlsphi_plan *plan = c->plan;
@@ -2779,7 +2841,7 @@ static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, ui
         return tlsphi_no_memory(plan, 640.0 * (double)n + 48.0 * (double)plan->pairs);
     if ((r = tlsphi_closure_lists(c, sorted, parent, list, g)) || (r = tlsphi_closure_parts(c, parent, c->p)) ||
         (r = tlsphi_closure_start(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_LIMIT, &plan->closure.residual)) ||
-        (r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_balance(c)))
+        (r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_balance(c, parent)))
         return r;
     tlsphi_closure_store(c, host_first, host_list, C);
     plan->closed_first = host_first;
