@@ -8811,7 +8811,7 @@ static tlsph_result tlsphi_mesh_check(tlsphi_mesh *m, int *balance, tlsph_error 
         if (!sum) continue;
         double Y[3];
         tlsphi_mesh_point(m, m->half[i] / 3, (int)(m->half[i] % 3), X);
-        tlsphi_mesh_point(m, m->half[i] / 3, (int)((m->half[i] + 1) % 3 == 0 ? 2 : m->half[i] % 3 + 1) % 3, Y);
+        tlsphi_mesh_point(m, m->half[i] / 3, (int)((m->half[i] % 3 + 1) % 3), Y);
         for (int k = 0; k < 3; k++) X[k] = (X[k] + Y[k]) / 2;
         return tlsphi_surface_fail(error, j - i > 1 ? "direction of an edge: a flipped facet" : "facets of an edge: a leak",
                                    X, (double)(j - i), "two, which run through it in opposite directions");

@@ -95,6 +95,20 @@ int ex_series_frame(ex_series *s, double time, size_t count, const double *posit
                     int field_count);
 void ex_series_close(ex_series *s);
 
+/* ---- triangle surfaces (stl.c) ------------------------------------------ */
+
+typedef struct ex_triangles {
+    double *corners; /* 9 a triangle, counter-clockwise from outside */
+    size_t count;
+} ex_triangles;
+
+#define EX_WHY 160
+/* Reads an STL file, binary or ASCII, and multiplies its lengths by `scale`. 0 on success; else `why` says what is wrong
+ * and where, and *out is empty. Whether the surface is closed is for tlsph_cloud_create to tell. */
+int ex_stl_read(const char *path, double scale, ex_triangles *out, char why[EX_WHY]);
+int ex_stl_write(const char *path, const ex_triangles *triangles, int ascii);
+void ex_stl_free(ex_triangles *triangles);
+
 /* ---- pictures (image.c) ------------------------------------------------- */
 
 typedef struct {

@@ -851,4 +851,32 @@ void cloud_mode_errors(const cloud_mode *mode, double *error_p, double *error_P)
 /* Runs for the periods and fits the frequency: its relative error. `step` is called 64 times; it may be NULL. */
 tlsph_result cloud_mode_measure(cloud_mode *mode, double *frequency_error, void (*step)(void *user), void *user);
 
+/* ---- part by a triangle surface ---------------------------------------------------------------------------------- */
+
+/* A free part of rubber, sampled as a cloud in a closed surface, gets a push on the face farthest along X and flies, bends
+   and turns. */
+typedef struct stl_part_parameters {
+    scene_options options;
+    ex_triangles surface; /* m; stays the caller's, needed during creation only */
+    double spacing;       /* m */
+    int seed;
+    double push[3];       /* Pa, largest, on the pushed face */
+    double duration;      /* s, of the push, half a sine */
+} stl_part_parameters;
+
+typedef struct stl_part {
+    scene_body body;
+    stl_part_parameters parameters;
+    double volume, area, centre[3]; /* of the surface, exact: m^3, m^2, m */
+    double face;          /* m^2, that is pushed */
+    size_t tip;           /* a particle there */
+} stl_part;
+
+void stl_part_default(stl_part_parameters *parameters);
+/* A bracket: an L with arms of 0.1 m, 0.04 m wide and 0.02 m thick, and a hole of radius 0.012 m in its corner, to be freed.
+   All corners are floats, as STL files have them. 0 on success. */
+int stl_part_bracket(ex_triangles *out);
+/* ERROR_SURFACE says where a surface leaks or a facet is flipped. */
+tlsph_result stl_part_create(const stl_part_parameters *parameters, stl_part *out, tlsph_error *error);
+
 #endif
