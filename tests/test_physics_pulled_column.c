@@ -96,6 +96,28 @@ TEST(slow_full_set_holds_where_pF_holds) {
     }
 }
 
+/* Layers pair up beside ends that are held sideways, where a column of nearly constant volume cannot stretch, and only there. */
+TEST(layers_pair_up_beside_held_ends_only) {
+    double pairing[2] = { 0, 0 };
+    DOUBLE_ONLY();
+    for (int sliding = 0; sliding < 2; sliding++) {
+        pulled_column_parameters p;
+        pulled_column column;
+        pulled_column_default(&p);
+        p.n = 2;
+        p.sliding = sliding;
+        p.elongation = 100;
+        REQUIRE_OK(pulled_column_create(&p, &column, NULL));
+        CHECK_RESULT(tlsph_advance(column.body.solver, R(pulled_column_end(&p))), TLSPH_OK);
+        pairing[sliding] = scene_alternation(&column.body, 2);
+        scene_destroy(&column.body);
+    }
+    REPORT("pairing %.4f held, %.5f sliding", pairing[0], pairing[1]);
+    CHECK(pairing[0] > 0.05);
+    CHECK_BELOW(pairing[1], 0.01);
+}
+
 SUITE(physics_pulled_column, ENTRY(a_pulled_column_follows_a_bar), ENTRY(a_quarter_of_the_column_moves_as_the_whole),
       ENTRY(slow_linear_step_fails_where_the_column_has_stiffened),
-      ENTRY(slow_full_set_holds_where_pF_holds))
+      ENTRY(slow_full_set_holds_where_pF_holds),
+      ENTRY(layers_pair_up_beside_held_ends_only))

@@ -3,7 +3,7 @@
 
 typedef struct outcome {
     twisting_column_shape shape;
-    double energy_ratio, gains, least_J, offset, drift, oscillation;
+    double energy_ratio, gains, least_J, offset, drift, oscillation, alternation;
     tlsph_result result;
 } outcome;
 
@@ -30,6 +30,7 @@ static outcome twist(const twisting_column_parameters *p) {
     }
     out.energy_ratio = before / start;
     out.oscillation = scene_oscillation(column.body.solver, TLSPH_FIELD_PRESSURE);
+    out.alternation = scene_alternation(&column.body, 1);
     scene_destroy(&column.body);
     return out;
 }
@@ -85,5 +86,41 @@ TEST(slow_column_survives_400_radians_per_second) {
     check_sound(&o, 0.2);
 }
 
+/* A field of positions that alternates along one axis by a tenth of a spacing on top of a smooth bend. */
+TEST(alternation_measures_what_alternates) {
+    twisting_column_parameters p = column_of(2, 0.45, 0, 1, TLSPH_PF);
+    twisting_column column;
+    REQUIRE_OK(twisting_column_create(&p, &column, NULL));
+    const size_t count = tlsph_count(column.body.solver);
+    tlsph_real *x = scene_read(column.body.solver, TLSPH_FIELD_POSITION);
+    for (size_t a = 0; a < count; a++) {
+        const tlsph_real Y = column.body.cloud.particles.positions[3 * a + 1];
+        x[3 * a] += R(0.01) * Y * Y + R(0.05) * (lround((double)Y / 0.5) % 2 ? R(1) : -R(1)); /* spacing 0.5 m */
+    }
+    CHECK_RESULT(tlsph_write(column.body.solver, TLSPH_FIELD_POSITION, x), TLSPH_OK);
+    CHECK_CLOSE(scene_alternation(&column.body, 1), 0.1, 1e-5);
+    free(x);
+    scene_destroy(&column.body);
+}
+
+/* Thrown fast, a clamped column keeps its layers in line without the rotating frame of the projection. */
+TEST(slow_wide_column_is_smooth) {
+    twisting_column_parameters p = column_of(5, 0.49, 300, 0.0921, TLSPH_PF);
+    outcome o;
+    double smooth;
+    DOUBLE_ONLY();
+    o = twist(&p);
+    CHECK_RESULT(o.result, TLSPH_OK);
+    p.options.kernel = TLSPH_CUBIC_SPLINE;
+    p.options.support = 0.9;
+    p.options.projection = 0;
+    smooth = twist(&p).alternation;
+    REPORT("alternation %.4f by default, %.4f wide", o.alternation, smooth);
+    CHECK(o.alternation > 0.06);
+    CHECK_BELOW(smooth, 0.04);
+}
+
 SUITE(physics_twist, ENTRY(column_keeps_its_axis_and_only_loses_energy), ENTRY(slow_column_turns_alike_at_three_resolutions),
-      ENTRY(slow_column_survives_400_radians_per_second))
+      ENTRY(slow_column_survives_400_radians_per_second),
+      ENTRY(alternation_measures_what_alternates),
+      ENTRY(slow_wide_column_is_smooth))

@@ -152,3 +152,40 @@ double scene_oscillation(const tlsph_solver *solver, tlsph_field field) {
     free(values);
     return out;
 }
+
+/* The next particle on both sides along the axis, or the particle itself where there is none; solver's numbers. */
+static void find_line(const tlsph_operator *view, const tlsph_real *X, int axis, size_t a, size_t next[2]) {
+    double reach[2] = { HUGE_VAL, HUGE_VAL };
+    next[0] = next[1] = a;
+    for (size_t i = view->first[a]; i < view->first[a + 1]; i++) {
+        const tlsph_real *from = X + 3 * (size_t)view->host[a], *to = X + 3 * (size_t)view->host[view->neighbours[i]];
+        const double d[3] = { (double)(to[0] - from[0]), (double)(to[1] - from[1]), (double)(to[2] - from[2]) };
+        const int side = d[axis] > 0;
+        if (!along(d, axis) || fabs(d[axis]) >= reach[side]) continue;
+        reach[side] = fabs(d[axis]);
+        next[side] = view->neighbours[i];
+    }
+}
+
+double scene_alternation(const scene_body *body, int axis) {
+    tlsph_real *X = scene_read(body->solver, TLSPH_FIELD_REFERENCE_POSITION), *x = scene_read(body->solver, TLSPH_FIELD_POSITION);
+    tlsph_operator view;
+    double squares = 0, count = 0;
+    tlsph_operator_view(body->solver, &view);
+    size_t (*next)[2] = malloc(view.count * sizeof *next);
+    for (size_t a = 0; X && next && a < view.count; a++) find_line(&view, X, axis, a, next[a]);
+    for (size_t a = 0; X && x && next && a < view.count; a++) {
+        const size_t down = next[a][0], up = next[a][1], far_down = next[down][0], far_up = next[up][1];
+        if (down == a || up == a || far_down == down || far_up == up) continue;
+        const size_t line[5] = { far_down, down, a, up, far_up };
+        for (size_t i = 0; i < 3; i++) {
+            static const double weights[5] = { 1, -4, 6, -4, 1 };
+            double sum = 0;
+            for (int k = 0; k < 5; k++) sum += weights[k] / 16 * (double)x[3 * (size_t)view.host[line[k]] + i];
+            squares += sum * sum;
+        }
+        count++;
+    }
+    free(X); free(x); free(next);
+    return count > 0 ? sqrt(squares / count) / (double)body->cloud.particles.spacing : 0;
+}

@@ -46,10 +46,10 @@ tlsph_result pulled_column_create(const pulled_column_parameters *p, pulled_colu
     fill.spacing = (tlsph_real)(width / p->n);
     fill.placement = p->centred ? TLSPH_CELL_CENTRED : TLSPH_ON_FACES;
     scene_begin(&setup, &fill, &material, error);
-    scene_add_plane(&setup, TLSPH_CLAMPED, 2, first);
+    scene_add_plane(&setup, p->sliding ? TLSPH_ROLLER : TLSPH_CLAMPED, 2, first);
     pull = scene_add_plane(&setup, TLSPH_VELOCITY, 2, length - first);
     pull->value[2] = (tlsph_real)p->speed;
-    memset(pull->normal, 0, sizeof pull->normal); /* the head is held sideways too */
+    if (!p->sliding) memset(pull->normal, 0, sizeof pull->normal); /* the head is held sideways too */
     for (int axis = 0; quarter && axis < 2; axis++) scene_add_plane(&setup, TLSPH_ROLLER, axis, 0);
     out->parameters.quarter = quarter;
     result = scene_end(&setup, &p->options, &out->body, error);

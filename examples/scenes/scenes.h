@@ -311,6 +311,11 @@ void impact_read(const impact *bar, double shock_speed, double from, double to, 
    and without memory, so that checks of bounds fail. `field` must have one component; `values` one a particle, host order. */
 double scene_oscillation(const tlsph_solver *solver, tlsph_field field);
 double scene_oscillation_of(const tlsph_solver *solver, const tlsph_real *values);
+
+/* How far every second particle is moved out of line along lattice lines of `axis`, in spacings: root of the mean square of
+   the fourth difference of positions over 16. What smooth shapes give falls with the fourth power of the spacing. */
+double scene_alternation(const scene_body *body, int axis);
+
 /* ---- twisting column: 001 section 7.3.1 -------------------------------------------------------------------------- */
 
 typedef struct twisting_column_parameters {
@@ -584,6 +589,7 @@ typedef struct pulled_column_parameters {
     int n;                   /* spacings across the width of 1 m, 6 n along the length of 6 m */
     int centred;             /* 1: particles at cell centres (n x n x 6n, as in 002), 0: on the faces */
     int quarter;             /* 1: a quarter of the section between rollers, for even n with particles on the faces */
+    int sliding;             /* 1: foot and head are held along the axis only, not sideways */
     double poisson, speed;   /* m/s, of the driven end */
     double elongation;       /* at which the pull ends, percent */
 } pulled_column_parameters;
