@@ -51,7 +51,7 @@ typedef struct moving_block {
     tlsph_unknowns unknowns;
     tlsph_thermal thermal;
     tlsph_material_kind material;
-    double jitter;
+    double jitter, mooney; /* share of the Mooney terms in mu */
     int threads, audit;
     tlsph_run_fn run; void *run_user;
     tlsph_allocator allocator;

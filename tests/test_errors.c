@@ -205,6 +205,8 @@ TEST(impossible_material_constants)
     BAD_CONSTANT(gruneisen_exponent, 1.1);
     BAD_CONSTANT(mooney_fraction, -0.1);
     BAD_CONSTANT(mooney_fraction, 1.1);
+    REFUSED((s.materials[1].gruneisen_exponent = 0, s.materials[1].expansion = R(0.01)), TLSPH_ERROR_MATERIAL, TLSPH_NO_PARTICLE);
+    CHECK(strcmp(error.field, "chi_R") == 0); /* kappa - 3 kappa alpha theta_R < 0 */
     REFUSED(s.materials[0].young = -1, TLSPH_ERROR_MATERIAL, TLSPH_NO_PARTICLE);
     REFUSED(s.materials[1].kind = TLSPH_USER, TLSPH_ERROR_MATERIAL, TLSPH_NO_PARTICLE); /* no callback */
     REFUSED(s.materials[1].kind = (tlsph_material_kind)77, TLSPH_ERROR_MATERIAL, TLSPH_NO_PARTICLE);
@@ -287,6 +289,8 @@ TEST(impossible_conditions)
     BAD_CONDITION(s.set[5] = 0xFFFFFFFFu, 0xFFFFFFFFu);
     BAD_CONDITION(s.conditions[1].kind = (tlsph_condition_kind)99, TLSPH_NO_PARTICLE);
     BAD_CONDITION(s.conditions[1].value[1] = R(NAN), TLSPH_NO_PARTICLE);
+    BAD_CONDITION(s.conditions[1].normal[2] = R(INFINITY), TLSPH_NO_PARTICLE);
+    BAD_CONDITION(s.conditions[1].point[0] = R(NAN), TLSPH_NO_PARTICLE);
     BAD_CONDITION(s.conditions[1].particles = NULL, TLSPH_NO_PARTICLE); /* with a count */
     BAD_CONDITION(s.conditions[1].cookie = 0, TLSPH_NO_PARTICLE);
     BAD_CONDITION(memset(&s.conditions[1], 0, sizeof s.conditions[1]), TLSPH_NO_PARTICLE);
@@ -310,6 +314,8 @@ TEST(heat_needs_a_thermal_scene)
 
 /* ---- cells and given pair vectors ---- */
 
+static void all_meet(spoilt *s) { for (int c = 0; c < 27; c++) s->cloud.cells[8 * c] = 0; }
+
 TEST(impossible_cells)
 {
     tlsph_error error;
@@ -319,6 +325,16 @@ TEST(impossible_cells)
     CHECK(error.value == 64 && says(&error, 64));
     CELLS(s.desc.particles.cells = NULL, TLSPH_ERROR_DESCRIPTION, TLSPH_NO_PARTICLE);
     CELLS(s.desc.particles.cell_count = 0, TLSPH_ERROR_DESCRIPTION, TLSPH_NO_PARTICLE);
+    CELLS(s.desc.particles.cell_count = 26, TLSPH_ERROR_NEIGHBOURS, 63); /* the last corner is left alone */
+    CELLS(all_meet(&s), TLSPH_ERROR_ARGUMENT, 0);
+    CELLS((s.cloud.cells[0] = 1, s.cloud.cells[1] = 0), TLSPH_ERROR_VOLUME, 1); /* turned inside out */
+}
+TEST(impossible_areas)
+{
+    static tlsph_real areas[3 * 64];
+    tlsph_error error;
+    areas[3 * VICTIM + 2] = R(INFINITY);
+    REFUSED((s.desc.operator_kind = TLSPH_CLOSED, s.desc.particles.areas = areas), TLSPH_ERROR_NOT_FINITE, VICTIM);
 }
 
 TEST(impossible_pair_vectors)
@@ -328,10 +344,14 @@ TEST(impossible_pair_vectors)
     static const size_t first[5] = {0, 1, 2, 3, 4};
     static const uint32_t bad_index[4] = {1, 0, 9, 2};
     static const uint32_t good_index[4] = {1, 0, 3, 2};
+    static const uint32_t own_index[4] = {0, 0, 3, 2}, one_way[4] = {1, 2, 3, 0};
+    static const size_t falling[5] = {0, 1, 0, 3, 4};
+    static const tlsph_real endless[12] = {1, 0, R(HUGE_VAL)}, nothing[12] = {0};
     static const tlsph_real not_antisymmetric[12] = {1, 0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0};
     tlsph_solver *solver = NULL;
     REQUIRE(spoilt_make(&s, 3));
     s.desc.particles.count = 4;
+    s.desc.particles.cell_count = 0;
     s.desc.condition_count = 0;
     s.desc.operator_kind = TLSPH_GIVEN;
     s.desc.particles.first = first;
@@ -342,8 +362,23 @@ TEST(impossible_pair_vectors)
     s.desc.particles.neighbours = good_index;
     CHECK(tlsph_create(&s.desc, &solver, &error) != TLSPH_OK);
     CHECK(solver == NULL && error.message[0] != 0);
-    s.desc.particles.pair_vectors = NULL;
-    CHECK_RESULT(tlsph_create(&s.desc, &solver, &error), TLSPH_ERROR_DESCRIPTION);
+    const struct { const size_t *first; const uint32_t *neighbours; const tlsph_real *vectors; tlsph_result result; } rows[] = {
+        {first, good_index, NULL, TLSPH_ERROR_DESCRIPTION},
+        {first, NULL, not_antisymmetric, TLSPH_ERROR_DESCRIPTION},
+        {NULL, good_index, not_antisymmetric, TLSPH_ERROR_DESCRIPTION},
+        {falling, good_index, not_antisymmetric, TLSPH_ERROR_SIZE},
+        {first, own_index, not_antisymmetric, TLSPH_ERROR_ARGUMENT},
+        {first, one_way, not_antisymmetric, TLSPH_ERROR_ARGUMENT},
+        {first, good_index, endless, TLSPH_ERROR_NOT_FINITE},
+        {first, good_index, nothing, TLSPH_ERROR_NEIGHBOURS}, /* antisymmetric, but no gradient follows */
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        s.desc.particles.first = rows[i].first;
+        s.desc.particles.neighbours = rows[i].neighbours;
+        s.desc.particles.pair_vectors = rows[i].vectors;
+        if (!CHECK_RESULT(tlsph_create(&s.desc, &solver, &error), rows[i].result)) printf("    row %d: %.200s\n", (int)i, error.message);
+        CHECK(solver == NULL);
+    }
     own_cloud_destroy(&s.cloud);
 }
 
@@ -600,7 +635,7 @@ SUITE(errors, ENTRY(the_unspoilt_scene_is_good), ENTRY(particles_not_finite), EN
       ENTRY(duplicate_positions), ENTRY(neighbours_missing_or_flat),
       ENTRY(impossible_material_constants), ENTRY(impossible_descriptions), ENTRY(wrong_counts),
       ENTRY(uninitialised_descriptions), ENTRY(impossible_conditions), ENTRY(heat_needs_a_thermal_scene),
-      ENTRY(impossible_cells), ENTRY(impossible_pair_vectors), ENTRY(impossible_values_written),
+      ENTRY(impossible_cells), ENTRY(impossible_areas), ENTRY(impossible_pair_vectors), ENTRY(impossible_values_written),
       ENTRY(impossible_time_steps), ENTRY(advance_meets_its_time), ENTRY(inversion_in_a_step),
       ENTRY(temperature_below_zero_in_a_step), ENTRY(retries_halve_the_step),
       ENTRY(a_load_that_is_not_finite), ENTRY(every_result_has_a_text))

@@ -249,6 +249,35 @@ TEST(jitter_keeps_faces)
     check_jitter_keeps_faces(l_shape(2), 2);
 }
 
+/* Cell-centred particles all move, within their share and by the seed; those on the faces of round bodies stay. */
+TEST(jitter_of_other_fills)
+{
+    tlsph_fill fill = box(3, 0.25);
+    tlsph_cloud plain, moved;
+    for (int i = 0; i < 2; i++) {
+        size_t stayed = 0;
+        fill.placement = i ? TLSPH_ON_FACES : TLSPH_CELL_CENTRED;
+        fill.shape = i ? TLSPH_CYLINDER : TLSPH_BOX;
+        fill.jitter = 0;
+        REQUIRE_OK(tlsph_cloud_create(&fill, &plain, NULL));
+        fill.jitter = R(0.2);
+        REQUIRE_OK(tlsph_cloud_create(&fill, &moved, NULL));
+        CHECK_SAME(moved.particles.count, plain.particles.count);
+        for (size_t a = 0; a < plain.particles.count; a++) {
+            double shift = 0;
+            for (size_t k = 3 * a; k < 3 * a + 3; k++)
+                shift = fmax(shift, fabs((double)moved.particles.positions[k] - (double)plain.particles.positions[k]));
+            CHECK_BELOW(shift, 0.2001 * (double)fill.spacing);
+            stayed += !(shift > 0);
+        }
+        CHECK(i ? stayed > plain.particles.count / 4 && stayed < plain.particles.count : stayed == 0);
+        CHECK_CLOSE(total(moved.particles.volumes, moved.particles.count),
+                    total(plain.particles.volumes, plain.particles.count), 1000 * EPSILON * 6);
+        tlsph_cloud_destroy(&plain);
+        tlsph_cloud_destroy(&moved);
+    }
+}
+
 /* ---- selection ---- */
 
 TEST(select_plane)
@@ -325,6 +354,8 @@ TEST(refusals)
     REFUSED((f.shape = TLSPH_CYLINDER, f.inner_radius = 5), TLSPH_ERROR_SIZE); /* nothing is left */
     REFUSED((f.shape = TLSPH_CYLINDER, f.inner_radius = -1), TLSPH_ERROR_DESCRIPTION);
     REFUSED((f.shape = TLSPH_L_SHAPE, f.notch[0] = 9), TLSPH_ERROR_DESCRIPTION);
+    REFUSED((f.shape = TLSPH_L_SHAPE, f.notch[0] = -1), TLSPH_ERROR_DESCRIPTION);
+    REFUSED((f.shape = TLSPH_TRIANGLES, f.placement = TLSPH_SCATTERED, f.surface.count = 4, f.spacing = 0), TLSPH_ERROR_DESCRIPTION);
     REFUSED(f.spacing = R(1e-7), TLSPH_ERROR_DESCRIPTION);
     REFUSED(f.cookie = 0, TLSPH_ERROR_DESCRIPTION);
     REFUSED(f.cookie ^= 0x5A5A5A5Au, TLSPH_ERROR_DESCRIPTION);
@@ -368,5 +399,5 @@ TEST(failing_allocations)
 SUITE(fill, ENTRY(volume_of_boxes), ENTRY(volume_of_l_shapes), ENTRY(volume_of_round_bodies),
       ENTRY(volume_of_disks_and_rings), ENTRY(volume_of_a_predicate), ENTRY(counts_on_lattices),
       ENTRY(spacing_is_rounded_to_whole_cells), ENTRY(tributary_volumes), ENTRY(jitter_follows_the_seed),
-      ENTRY(jitter_keeps_faces), ENTRY(select_plane), ENTRY(select_by_predicate), ENTRY(refusals), ENTRY(uninitialised),
+      ENTRY(jitter_keeps_faces), ENTRY(jitter_of_other_fills), ENTRY(select_plane), ENTRY(select_by_predicate), ENTRY(refusals), ENTRY(uninitialised),
       ENTRY(failing_allocations))

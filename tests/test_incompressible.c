@@ -39,6 +39,9 @@ static void thermal(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) {
     (void)c; d->thermal = TLSPH_ENERGY; m->specific_heat = 1;
 }
 static void evolves_J(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->unknowns = TLSPH_PFJ; }
+static void evolves_all(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->unknowns = TLSPH_PFHJ; }
+static void bonds(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->operator_kind = TLSPH_BOND; }
+static void fourth(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->operator_kind = TLSPH_CELLS_4; }
 static void sharp(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->sharp_gradients = 1; }
 static void third_order(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)m; (void)c; d->integrator = TLSPH_SSP_RK3; }
 static void gas(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) { (void)d; (void)c; m->kind = TLSPH_MIE_GRUNEISEN; }
@@ -61,6 +64,8 @@ TEST(refuses_what_it_cannot_do) {
                   { sharp, TLSPH_ERROR_DESCRIPTION, "sharp_gradients" }, { third_order, TLSPH_ERROR_DESCRIPTION, "integrator" },
                   { gas, TLSPH_ERROR_MATERIAL, "kind" },                 { beyond, TLSPH_ERROR_MATERIAL, "poisson" },
                   { plain_half, TLSPH_ERROR_MATERIAL, "poisson" },       { wall, TLSPH_ERROR_CONDITION, "kind" },
+                  { evolves_all, TLSPH_ERROR_DESCRIPTION, "unknowns" },  { bonds, TLSPH_ERROR_DESCRIPTION, "operator" },
+                  { fourth, TLSPH_ERROR_DESCRIPTION, "operator_kind" },
                   { no_tolerance, TLSPH_ERROR_DESCRIPTION, "incompressible.tolerance" } };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         tlsph_solver *solver;
@@ -71,9 +76,12 @@ TEST(refuses_what_it_cannot_do) {
     }
 }
 
-TEST(too_few_iterations_are_an_error_and_leave_the_last_good_state) {
+static void few_pseudo_times(tlsph_desc *d, tlsph_material *m, tlsph_condition *c) {
+    few_iterations(d, m, c); d->incompressible.iteration = TLSPH_DUAL_TIME;
+}
+static void too_few(void (*change)(tlsph_desc *, tlsph_material *, tlsph_condition *)) {
     tlsph_solver *solver;
-    REQUIRE_OK(beam(few_iterations, &solver, NULL));
+    REQUIRE_OK(beam(change, &solver, NULL));
     CHECK_RESULT(tlsph_step(solver, R(1)), TLSPH_OK); /* a uniform fall needs no pressure */
     const uint64_t before = state_hash(solver);
     CHECK_RESULT(tlsph_step(solver, R(1)), TLSPH_ERROR_CONVERGENCE);
@@ -83,6 +91,7 @@ TEST(too_few_iterations_are_an_error_and_leave_the_last_good_state) {
     CHECK(strstr(tlsph_last_error(solver)->message, "iteration_limit") != NULL);
     tlsph_destroy(solver);
 }
+TEST(too_few_iterations_are_an_error_and_leave_the_last_good_state) { too_few(few_iterations); too_few(few_pseudo_times); }
 
 TEST(report_counts_and_the_explicit_scheme_has_none) {
     moving_block block = moving_block_default();

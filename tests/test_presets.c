@@ -15,6 +15,9 @@ TEST(set_what_they_promise) {
     for (int i = 0; i <= TLSPH_PRESET_ACCURATE; i++) {
         const tlsph_desc lattice = preset_of((tlsph_preset_name)i, TLSPH_CORRECTED_KERNEL, 1);
         const tlsph_desc cloud = preset_of((tlsph_preset_name)i, TLSPH_CLOSED, 0);
+        const tlsph_desc cells = preset_of((tlsph_preset_name)i, TLSPH_CELLS, 1);
+        const tlsph_desc again = preset_of((tlsph_preset_name)i, TLSPH_CELLS_4, 1);
+        CHECK(cells.operator_kind == again.operator_kind && cells.operator_kind == lattice.operator_kind);
         const tlsph_desc loose = preset_of((tlsph_preset_name)i, TLSPH_CORRECTED_KERNEL, 0);
         CHECK_SAME(lattice.operator_kind, i > 0 ? TLSPH_CELLS_4 : TLSPH_CELLS);
         CHECK_SAME(lattice.sharp_gradients, 0);
@@ -29,6 +32,16 @@ TEST(set_what_they_promise) {
 
 TEST(leave_the_rest_alone) {
     tlsph_desc desc = tlsph_desc_default(3);
+    desc.operator_kind = TLSPH_CELLS;
+    desc.dissipation = TLSPH_JST; /* not with order 4 */
+    tlsph_preset(&desc, TLSPH_PRESET_ACCURATE);
+    CHECK_SAME(desc.operator_kind, TLSPH_CELLS);
+    desc = tlsph_desc_default(3);
+    desc.support = R(0.9);
+    desc.particles.cell_count = 1; /* a lattice with more than 6 neighbours stays what it is */
+    tlsph_preset(&desc, TLSPH_PRESET_FAST);
+    CHECK_SAME(desc.operator_kind, TLSPH_CORRECTED_KERNEL);
+    desc = tlsph_desc_default(3);
     tlsph_preset(&desc, (tlsph_preset_name)7);
     CHECK_SAME(desc.integrator, TLSPH_RK2);
     desc.scheme = TLSPH_INCOMPRESSIBLE; /* needs two stages */

@@ -108,6 +108,42 @@ TEST(distances)
     check_cloud(&fill, 2.52 - SCENE_PI * 0.16, 6.4 + 0.8 * SCENE_PI, 0.01);
 }
 
+/* Tubes and shells: the built-in round bodies, scattered. */
+TEST(round_bodies)
+{
+    tlsph_fill fill = scattered(3, NULL, 0.25);
+    fill.shape = TLSPH_CYLINDER;
+    fill.axis = 1;
+    fill.inner_radius = R(0.4);
+    check_cloud(&fill, 2 * SCENE_PI * 0.84, 2 * SCENE_PI * 0.84 + 4 * SCENE_PI * 1.4, 0.02);
+    fill.dimension = 2;
+    fill.spacing = R(0.1);
+    check_cloud(&fill, SCENE_PI * 0.84, 2 * SCENE_PI * 1.4, 0.01);
+}
+static tlsph_real not_a_spacing(void *user, const tlsph_real X[3])
+{
+    (void)X;
+    return *(const tlsph_real *)user;
+}
+/* A local spacing that cannot be meant stands for the plain one. */
+TEST(impossible_spacings)
+{
+    const tlsph_real wrong[4] = { 0, -1, R(NAN), R(1e30) };
+    tlsph_fill fill = scattered(2, plate, 0.2);
+    tlsph_cloud plain, cloud;
+    REQUIRE_OK(tlsph_cloud_create(&fill, &plain, NULL));
+    for (int i = 0; i < 4; i++) {
+        fill.spacing_at = not_a_spacing;
+        fill.spacing_user = (void *)(size_t)(wrong + i);
+        if (!CHECK_RESULT(tlsph_cloud_create(&fill, &cloud, NULL), TLSPH_OK)) continue;
+        for (size_t a = 0; cloud.particles.spacings && a < cloud.particles.count; a++)
+            CHECK_CLOSE(cloud.particles.spacings[a], 0.2, 0.02);
+        CHECK(fabs((double)cloud.particles.count / (double)plain.particles.count - 1) < 0.15);
+        tlsph_cloud_destroy(&cloud);
+    }
+    tlsph_cloud_destroy(&plain);
+}
+
 TEST(varying_spacing)
 {
     tlsph_real least = R(0.06);
@@ -158,5 +194,5 @@ TEST(body_beyond_its_box)
     CHECK_RESULT(tlsph_cloud_create(&fill, &cloud, NULL), TLSPH_ERROR_DESCRIPTION);
 }
 
-SUITE(shapes, ENTRY(boxes), ENTRY(distances), ENTRY(varying_spacing), ENTRY(the_seed_decides), ENTRY(triangles),
+SUITE(shapes, ENTRY(boxes), ENTRY(distances), ENTRY(round_bodies), ENTRY(impossible_spacings), ENTRY(varying_spacing), ENTRY(the_seed_decides), ENTRY(triangles),
       ENTRY(body_beyond_its_box))
