@@ -1235,7 +1235,7 @@ static void tlsphi_solve_symmetric(const double A[9], const double b[3], double 
     const double largest = tlsphi_dmax(fabs(D[0]), tlsphi_dmax(fabs(D[4]), fabs(D[8])));
     x[0] = x[1] = x[2] = 0;
     for (int k = 0; k < 3; k++) {
-        if (fabs(D[4 * k]) <= 1e-12 * largest || D[4 * k] == 0) continue;
+        if (fabs(D[4 * k]) <= 1e-12 * largest) continue;
         const double share = (Q[k] * b[0] + Q[3 + k] * b[1] + Q[6 + k] * b[2]) / D[4 * k];
         for (int i = 0; i < 3; i++) x[i] += share * Q[3 * i + k];
     }

@@ -218,6 +218,130 @@ TEST(cells_bring_their_volumes)
     }
 }
 
+/* Two materials without a list: all particles are of the first. With one: steel flows in its half only. */
+TEST(materials_keep_to_their_particles)
+{
+    small s;
+    tlsph_ledger first, last;
+    tlsph_material both[2];
+    tlsph_solver *solver;
+    tlsph_real *strain;
+    REQUIRE(small_make(&s, 3));
+    both[0] = s.material;
+    both[1] = soft_material(TLSPH_VON_MISES);
+    both[1].yield_stress = 1;
+    both[1].density = 3 * both[0].density;
+    s.desc.particles.materials = NULL;
+    s.desc.materials = both;
+    s.desc.material_count = 2;
+    moved(&s, 0.3, &first, &last);
+    CHECK_CLOSE(last.mass, both[0].density, 100 * EPSILON * (double)both[0].density);
+    for (size_t a = 0; a < s.cloud.particles.count; a++) s.cloud.materials[a] = (double)s.cloud.positions[3 * a] > 0.4;
+    s.desc.particles.materials = s.cloud.materials;
+    REQUIRE_OK(tlsph_create(&s.desc, &solver, NULL));
+    CHECK_RESULT(moving_block_kick(solver, 5), TLSPH_OK);
+    CHECK_RESULT(take_steps(solver, 10), TLSPH_OK);
+    REQUIRE((strain = read_field(solver, TLSPH_FIELD_PLASTIC_STRAIN)) != NULL);
+    int flowed = 0;
+    for (size_t a = 0; a < s.cloud.particles.count; a++) {
+        if (!s.cloud.materials[a]) CHECK(strain[a] == 0);
+        flowed += strain[a] > 0;
+    }
+    CHECK(flowed > 25);
+    free(strain);
+    tlsph_destroy(solver);
+    own_cloud_destroy(&s.cloud);
+}
+/* A load on areas without a normal: each particle's whole area vector counts. */
+TEST(heat_through_whole_area_vectors)
+{
+    small s;
+    tlsph_solver *solver;
+    tlsph_operator o;
+    tlsph_ledger first, last;
+    uint32_t face[25];
+    double area = 0;
+    REQUIRE(small_make(&s, 3));
+    s.desc.thermal = TLSPH_ENERGY;
+    s.material.conductivity = 0;
+    s.conditions[0] = tlsph_condition_default(TLSPH_HEAT_FLUX);
+    s.conditions[0].particles = face;
+    s.conditions[0].count = tlsph_select_plane(&s.cloud.particles, 0, 0, R(1e-6), face, 25);
+    s.conditions[0].value[0] = -100; /* into the body */
+    s.desc.condition_count = 1;
+    REQUIRE_OK(tlsph_create(&s.desc, &solver, NULL));
+    tlsph_operator_view(solver, &o);
+    for (size_t a = 0; a < o.count; a++) {
+        const tlsph_real *B = o.boundary + 3 * a;
+        if (s.cloud.positions[3 * o.host[a]] < R(1e-6)) area += sqrt((double)(B[0] * B[0] + B[1] * B[1] + B[2] * B[2]));
+    }
+    CHECK(area > 1 && area < 2); /* the face has 1 m^2, the vectors at its edges reach around them */
+    tlsph_ledger_read(solver, &first);
+    CHECK_RESULT(tlsph_step(solver, R(1e-4)), TLSPH_OK);
+    tlsph_ledger_read(solver, &last);
+    CHECK_CLOSE(last.external_heat, 100 * area * last.time, ROUNDED(1e-12, 100) * 100 * area * last.time);
+    CHECK_CLOSE(last.thermal_energy - first.thermal_energy, last.external_heat, ROUNDED(1e-6, 1e7) * last.external_heat + 10 * EPSILON * last.thermal_energy);
+    tlsph_destroy(solver);
+    own_cloud_destroy(&s.cloud);
+}
+/* A sphere of many more facets than its particles can see one by one. */
+static void facet(tlsph_real *corner, size_t *at, const double a[3], const double b[3], const double c[3], int level)
+{
+    double m[3][3];
+    if (level == 0) {
+        for (int k = 0; k < 9; k++) corner[*at + (size_t)k] = R((k < 3 ? a : k < 6 ? b : c)[k % 3]);
+        *at += 9;
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *p = i == 0 ? a : i == 1 ? b : c, *q = i == 0 ? b : i == 1 ? c : a;
+        for (int k = 0; k < 3; k++) m[i][k] = p[k] + q[k]; /* the same sum from either side */
+        const double size = sqrt(m[i][0] * m[i][0] + m[i][1] * m[i][1] + m[i][2] * m[i][2]);
+        for (int k = 0; k < 3; k++) m[i][k] /= size;
+    }
+    facet(corner, at, a, m[0], m[2], level - 1);
+    facet(corner, at, m[0], b, m[1], level - 1);
+    facet(corner, at, m[2], m[1], c, level - 1);
+    facet(corner, at, m[0], m[1], m[2], level - 1);
+}
+TEST(a_surface_finer_than_the_particles)
+{
+    enum { LEVEL = 5, FACETS = 8 << (2 * LEVEL) };
+    tlsph_real *corners = malloc(9 * FACETS * sizeof *corners), X[3 * 33], V[33], B[3 * 33];
+    tlsph_surface surface = {FACETS, corners};
+    tlsph_particles p;
+    size_t at = 0;
+    double total = 0, open[3] = {0};
+    tlsph_error error;
+    DOUBLE_ONLY();
+    REQUIRE(corners);
+    memset(&p, 0, sizeof p);
+    for (int i = 0; i < 8; i++) {
+        const double x[3] = {i & 1 ? -1 : 1, 0, 0}, y[3] = {0, i & 2 ? -1 : 1, 0}, z[3] = {0, 0, i & 4 ? -1 : 1};
+        const int turned = ((i & 1) + (i >> 1 & 1) + (i >> 2)) % 2;
+        facet(corners, &at, x, turned ? z : y, turned ? y : z, LEVEL);
+    }
+    for (int i = 0; i < 125; i++) { /* a lattice of spacing 0.5 inside */
+        const double x[3] = {0.5 * (i % 5 - 2), 0.5 * (i / 5 % 5 - 2), 0.5 * (i / 25 - 2)};
+        if (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] > 0.9) continue;
+        for (int k = 0; k < 3; k++) X[3 * p.count + (size_t)k] = R(x[k]);
+        p.count++;
+    }
+    p.positions = X;
+    p.spacing = R(0.5);
+    if (CHECK_RESULT(tlsph_voronoi(3, &p, &surface, NULL, V, B, &error), TLSPH_OK)) {
+        for (size_t a = 0; a < p.count; a++) {
+            CHECK(V[a] > R(0.5 * 0.125) && V[a] < R(3 * 0.125));
+            total += (double)V[a];
+            for (int k = 0; k < 3; k++) open[k] += (double)B[3 * a + (size_t)k];
+        }
+        CHECK_CLOSE(total, 4 * PI / 3, 2e-3 * 4 * PI / 3); /* that of the facets */
+        for (int k = 0; k < 3; k++) CHECK_CLOSE(open[k], 0, 1e4 * EPSILON);
+    } else printf("    %s\n", error.message);
+    REPORT("%d particles, volume %+.1e", (int)p.count, total / (4 * PI / 3) - 1);
+    free(corners);
+}
+
 /* ---- mirrors of the operator of order 4 ---- */
 
 static uint64_t operator_hash(small *s)
@@ -310,4 +434,6 @@ SUITE(edges, ENTRY(calls_without_arguments), ENTRY(constants_outside_their_lists
       ENTRY(no_dissipation_without_area_or_distance), ENTRY(parts_that_may_be_missing),
       ENTRY(entropy_at_gruneisen_exponent_0), ENTRY(strains_beyond_the_numbers),
       ENTRY(options_without_an_object_change_nothing), ENTRY(entropy_without_the_heat_of_dissipation),
-      ENTRY(cells_bring_their_volumes), ENTRY(which_conditions_mirror), ENTRY(layers_of_two_sizes))
+      ENTRY(cells_bring_their_volumes),
+      ENTRY(materials_keep_to_their_particles), ENTRY(heat_through_whole_area_vectors),
+      ENTRY(a_surface_finer_than_the_particles), ENTRY(which_conditions_mirror), ENTRY(layers_of_two_sizes))
