@@ -157,7 +157,7 @@ int main(int argc, char **argv) {
     driver_arguments(argc, argv, "stl_part", "a part from an STL file as a cloud, pushed on one face", &p.options,
                      own, (int)(sizeof own / sizeof *own));
     code = file[0] ? read_part(file, scale, &p.surface)
-                   : make_bracket(p.options.output ? p.options.output : "out/stl_part", &p.surface);
+                   : make_bracket(p.options.output[0] ? p.options.output : "out/stl_part", &p.surface);
     if (!code) code = run_part(&p);
     ex_stl_free(&p.surface);
     return code;
