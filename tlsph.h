@@ -3447,6 +3447,7 @@ struct tlsph_solver {
     int heat_moves; /* the fluxes hold conduction: conducts, but for the mechanical part of a split step */
     tlsphi_super super;
     int audit, projection, dissipation_heats, retries, threads, bonds;
+    int turns;         /* the body's spin turns F exactly (tlsphi_turn_gradient) */
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
     int parted;        /* stresses and dissipation are gathered apart: frozen, or over different pairs */
     tlsph_integrator integrator;
@@ -4439,22 +4440,37 @@ static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
     }
     return s->image + low;
 }
+/* dF/dt = grad w + spin x F: exact for turns where grad x is F only to the slack of TLSPH_CLOSED. P does no work on the
+   second part. */
+static void tlsphi_turn_gradient(tlsph_solver *s, const double spin[3], size_t a) {
+    const size_t D = (size_t)s->dim, dd = D * D;
+    tlsph_real *rate = s->rate_F + dd * a, G[9];
+    tlsphi_row_get(s, s->rows.grad_w, (int)dd, a, G);
+    for (size_t j = 0; j < D; j++) {
+        double column[3] = {0, 0, 0}, turn[3];
+        for (size_t i = 0; i < D; i++) column[i] = (double)s->now.F[dd * a + D * i + j];
+        tlsphi_cross3(spin, column, turn);
+        for (size_t i = 0; i < D; i++) rate[D * i + j] = G[D * i + j] + (tlsph_real)turn[i];
+    }
+}
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     const int with_S = s->has_J && s->damps, with_theta = s->heat_moves;
-    const int with_w = s->projection && (s->damps || s->rate_E); /* w and Sigma_J are there for the dissipation and E */
+    /* w and Sigma_J are there for the dissipation, E and turns */
+    const int with_w = s->projection && (s->damps || s->rate_E || s->turns);
     const tlsphi_image *image = tlsphi_find_image(s, block->begin), *last = s->image + s->images;
     for (size_t a = block->begin, tile = block->tile, end; a < block->end; a = end, tile++) {
         end = tlsphi_tile_end(block, a);
         if (s->dim == 3) tlsphi_gradient_tile(s, block, tile, a, end, 3, with_w, with_S, with_theta);
         else tlsphi_gradient_tile(s, block, tile, a, end, 2, with_w, with_S, with_theta);
     }
-    if (!s->rest && !s->mirrors && !s->images && !with_theta) return;
+    if (!s->rest && !s->mirrors && !s->images && !with_theta && !s->turns) return;
     for (size_t a = block->begin; a < block->end; a++) {
         const int mirrored = tlsphi_mirrors_of(s, a) != NULL, imaged = image != last && image->particle == a;
         if (s->rest) tlsphi_gradient_rest(s, a);
         for (; image != last && image->particle == a; image++) tlsphi_image_gradient(s, image);
         if (mirrored) tlsphi_mirror_gradients(s, a);
-        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored)) tlsphi_jacobian_rate(s, a);
+        if (s->turns) tlsphi_turn_gradient(s, s->body[block->body].spin, a);
+        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || s->turns)) tlsphi_jacobian_rate(s, a);
         if (with_theta) tlsphi_heat_flux(s, a);
     }
 }
@@ -7564,6 +7580,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->has_plastic |= d->materials[i].kind == TLSPH_VON_MISES;
         s->metal &= d->materials[i].kind == TLSPH_VON_MISES;
     }
+    s->turns = d->projection && d->operator_kind == TLSPH_CLOSED && !s->linear && !s->sharp && !s->incompressible;
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
         s->rows.lap_p = s->rows.count;
