@@ -60,7 +60,7 @@ static double derivative(gradient_form form, const gradient_field *f, int i, int
     const int first = form != GRADIENT_BOND_ZEROTH;
     const correction c = correct(first, i, n, spacing, h);
     const double X = (i + 0.5) * spacing, value = f->value(X);
-    double standard = 0, bonds = 0, self = 0;
+    double standard = 0, bonds = 0, self = 0, others = 0; /* the last two: weights of the kernel */
     for (int j = first_near(i, spacing, h); j < end_near(i, n, spacing, h); j++) {
         const double x = (i - j) * spacing, shape = 1 + c.beta * x;
         double W, slope;
@@ -70,8 +70,12 @@ static double derivative(gradient_form form, const gradient_field *f, int i, int
         standard += spacing * c.L * jump *
                     (c.alpha * shape * slope + (c.d_alpha * shape + c.alpha * (c.d_beta * x + c.beta)) * W);
         if (j == i) self = weight;
-        else bonds -= weight * jump / x;
+        else {
+            bonds -= weight * jump / x;
+            others += weight;
+        }
     }
+    if (form == GRADIENT_OPERATOR) return (1 - others) * standard + bonds; /* A G + w n/r with A = 1 - sum w */
     return form == GRADIENT_STANDARD ? standard : form == GRADIENT_BOND_ONLY ? bonds : bonds + self * standard;
 }
 

@@ -463,7 +463,8 @@ typedef enum gradient_form {
     GRADIENT_BOND_ONLY,    /* (34) with (35): no bond of a particle with itself */
     GRADIENT_BOND_FIRST,   /* (34) with (36) and the first-order kernel */
     GRADIENT_BOND_ZEROTH,  /* the same with the zeroth-order kernel and its corrected gradient */
-    GRADIENT_FORMS
+    GRADIENT_FORMS,
+    GRADIENT_OPERATOR = GRADIENT_FORMS /* GRADIENT_BOND_FIRST as the constant map of [BONDS], for comparison */
 } gradient_form;
 typedef struct gradient_field { double (*value)(double X), (*slope)(double X); } gradient_field;
 
