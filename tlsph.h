@@ -550,7 +550,6 @@ typedef struct tlsph_surface {
     const tlsph_real *corners;
 } tlsph_surface;
 
-
 typedef struct tlsph_fill {
     uint32_t cookie;
     int dimension;
@@ -3320,7 +3319,6 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
    the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
    so their value does not depend on the threads. */
 
-
 /* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
    P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, drift
    ratio); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and grad w beside the sharpened. */
@@ -4059,10 +4057,8 @@ static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block) {
    sought: plastic flow over a few spacings looks like one, and yielding bounds the overshoot. Taylor bar, 4 spacings a
    radius: the final radius is 6.35 mm with fronts, 6.6 without, for 7.0. */
 
-#define TLSPHI_FRONT_LOW                                                                                               \
-    0.0015 /* approach over p speed from which a pair may be a front; full strength at twice this */
-#define TLSPHI_FRONT_GAIN                                                                                              \
-    4 /* measured on symmetric impacts at 0.1 and 0.3 c_p: overshoot 2 to 3 %, 25 to 45 % without */
+#define TLSPHI_FRONT_LOW 0.0015 /* approach over p speed from which a pair may be a front; full strength at twice it */
+#define TLSPHI_FRONT_GAIN 4 /* on symmetric impacts at 0.1 and 0.3 c_p: overshoot 2 to 3 %, 25 to 45 % without */
 
 /* By symmetry a raw jump may be 0 but for round-off where Dr is not: were its sign asked then, chance would switch the
    dissipation and a symmetric body lose its symmetry. So a raw jump below this share of Dr counts as 0; near incompressibility
@@ -4581,10 +4577,11 @@ static void tlsphi_laplacian_lean(const tlsph_solver *s, size_t a, tlsph_real le
     if (s->M) tlsphi_multiply_transposed(s->dim, s->M + D * D * a, lean, turned);
 }
 /* rho w of b less that of a */
-static void tlsphi_momentum_jump(const tlsph_solver *s, size_t a, size_t b, tlsph_real *jump) {
+TLSPHI_INLINE void tlsphi_momentum_jump(const tlsph_solver *s, size_t a, size_t b, const int dim, tlsph_real *jump) {
     const tlsph_real *w_a = tlsphi_at(s, s->rows.w, a), *w_b = tlsphi_at(s, s->rows.w, b);
     const tlsph_real rho_a = tlsphi_material_of(s, a)->rho, rho_b = tlsphi_material_of(s, b)->rho;
-    for (size_t i = 0; i < (size_t)s->dim; i++) jump[i] = rho_b * w_b[i * TLSPHI_ROW] - rho_a * w_a[i * TLSPHI_ROW];
+    TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++)
+        jump[i] = rho_b * w_b[i * TLSPHI_ROW] - rho_a * w_a[i * TLSPHI_ROW];
 }
 static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
@@ -4595,7 +4592,7 @@ static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
             const size_t b = s->neighbour[k];
             tlsph_real L = s->laplacian[k] / s->V[a] - tlsphi_dot(s->dim, lean, s->g + D * k);
             if (s->rest) L -= tlsphi_dot(s->dim, lean + D, s->rest + D * k);
-            tlsphi_momentum_jump(s, a, b, jump);
+            tlsphi_momentum_jump(s, a, b, s->dim, jump);
             for (size_t i = 0; i < D; i++) sum[i] += L * jump[i];
         }
         tlsphi_row_put(s, s->rows.lap_p, s->dim, a, sum);
@@ -4647,21 +4644,23 @@ TLSPHI_INLINE void tlsphi_load_heat(const tlsphi_rows *r, const tlsph_real *at, 
     out->h_J = at[r->h_J * TLSPHI_ROW];
 }
 
-/* (002-28) for one pair. */
-static void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, tlsph_real *D_p) {
-    const tlsph_real c = (tlsphi_material_of(s, a)->c_linear + tlsphi_material_of(s, b)->c_linear) / 2;
-    const tlsph_real l = s->laplacian[k] * c, eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
-    const tlsph_real *lap_a = tlsphi_at(s, s->rows.lap_p, a), *lap_b = tlsphi_at(s, s->rows.lap_p, b);
-    tlsph_real jump[3];
-    tlsphi_momentum_jump(s, a, b, jump);
-    for (size_t i = 0; i < (size_t)s->dim; i++)
-        D_p[i] = l * (eta2 * jump[i] - eta4 * (lap_b[i * TLSPHI_ROW] - lap_a[i * TLSPHI_ROW]));
-}
 /* What a pair dissipates: the fluxes, their production, and whether it might be a front. */
 typedef struct tlsphi_damping {
     tlsph_real D_p[3], D_J, production, approaches;
 } tlsphi_damping;
-
+/* (002-28) for one pair. */
+TLSPHI_INLINE void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, int dim, tlsphi_damping *out) {
+    const tlsph_real c = (tlsphi_material_of(s, a)->c_linear + tlsphi_material_of(s, b)->c_linear) / 2;
+    const tlsph_real l = s->laplacian[k] * c, eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
+    const tlsph_real *lap_a = tlsphi_at(s, s->rows.lap_p, a), *lap_b = tlsphi_at(s, s->rows.lap_p, b);
+    const tlsph_real *w_a = tlsphi_at(s, s->rows.w, a), *w_b = tlsphi_at(s, s->rows.w, b);
+    tlsph_real jump[3];
+    tlsphi_momentum_jump(s, a, b, dim, jump);
+    TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) {
+        out->D_p[i] = l * (eta2 * jump[i] - eta4 * (lap_b[i * TLSPHI_ROW] - lap_a[i * TLSPHI_ROW]));
+        out->production += (w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW]) * out->D_p[i];
+    }
+}
 /* Default forms for one pair: g and |C| of the pair. dim, with_J, with_front, kind are constants after inlining. Without
    with_front the fluxes are those away from fronts, and `approaches` tells whether that must be looked at again. */
 TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsphi_damp_side *a, const tlsphi_damp_side *b, const tlsph_real *g, tlsph_real CC,
@@ -4828,14 +4827,15 @@ TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t
     tlsphi_damping flux;
     tlsph_real heat = 0, c[3];
     memset(&flux, 0, sizeof flux);
-    tlsphi_load_side(&s->rows, tlsphi_at(s, 0, a), dim, s->has_J, &side_a);
-    tlsphi_load_side(&s->rows, tlsphi_at(s, 0, b), dim, s->has_J, &side_b);
+    if (s->dissipation != TLSPH_JST || s->audit) {
+        tlsphi_load_side(&s->rows, tlsphi_at(s, 0, a), dim, s->has_J, &side_a);
+        tlsphi_load_side(&s->rows, tlsphi_at(s, 0, b), dim, s->has_J, &side_b);
+    }
     if (s->dissipation == TLSPH_AS_PRINTED) {
         tlsphi_multiply_mean(dim, side_a.A, side_b.A, g, c);
         tlsphi_pair_printed(s, a, b, &side_a, &side_b, C, c, &flux, &heat);
     } else if (s->dissipation == TLSPH_JST) {
-        tlsphi_pair_jst(s, a, b, k, flux.D_p);
-        for (int i = 0; i < dim; i++) flux.production += (side_b.w[i] - side_a.w[i]) * flux.D_p[i];
+        tlsphi_pair_jst(s, a, b, k, dim, &flux);
     } else {
         const tlsph_real CC = tlsphi_sqrt(tlsphi_max(tlsphi_dot(dim, C, C), TLSPHI_TINY));
         tlsphi_pair_dissipate(&side_a, &side_b, g, CC, dim, s->has_J, 1, (int)s->dissipation, s->metal, s->jump_share,
