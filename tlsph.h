@@ -61,8 +61,9 @@ PROMISES
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
-  [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION]
-  [CREATION] [TILES] [SELF-TEST] [PREFLIGHT] [VORONOI] [SHAPES] [FILL] [REPRODUCING] [LICENCE]
+  [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEAPFROG] [ALGORITHM] [LEDGER]
+  [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [TILES] [SELF-TEST] [PREFLIGHT] [VORONOI] [SHAPES] [FILL]
+  [REPRODUCING] [LICENCE]
 */
 #ifndef TLSPH_H
 #define TLSPH_H
@@ -218,7 +219,9 @@ typedef enum tlsph_integrator {
     TLSPH_RK2,        /* two-stage total-variation-diminishing Runge-Kutta (000-77); amplifies waves by (w dt)^4/8 a step */
     TLSPH_SSP_RK3,    /* three-stage strong-stability-preserving scheme of Shu and Osher (002-30, right stage times) */
     TLSPH_RK3_FROZEN, /* u0 + c dt (L(u) + D(u0)), c = 1/3, 1/2, 1: third order for linear problems */
-    TLSPH_RK4_FROZEN  /* c = 1/4, 1/3, 1/2, 1: fourth order for linear problems */
+    TLSPH_RK4_FROZEN, /* c = 1/4, 1/3, 1/2, 1: fourth order for linear problems */
+    TLSPH_LEAPFROG    /* F by half a step, p by a whole one, F by the other half: the forces are evaluated once a step.
+                         Second order; dissipation and conduction first order in the step */
 } tlsph_integrator;
 
 typedef enum tlsph_preset_name { TLSPH_PRESET_FAST, TLSPH_PRESET_BALANCED, TLSPH_PRESET_ACCURATE } tlsph_preset_name;
@@ -666,7 +669,7 @@ TLSPH_API tlsph_desc tlsph_desc_default(int dimension);
 /* Sets how a scene is computed, when `particles` and what is computed (unknowns, thermal, operator) are set: integrator,
    cfl, conduction_stages (9), sharp_gradients (0) and, where the operator is one of lattices with 6 neighbours, its kind.
    Points of the measured front of error against time (bench/study.c):
-     TLSPH_PRESET_FAST      TLSPH_CELLS, TLSPH_RK3_FROZEN: the accuracy of the default in two thirds of its time
+     TLSPH_PRESET_FAST      TLSPH_CELLS, TLSPH_LEAPFROG: the accuracy of the default in less than half of its time
      TLSPH_PRESET_BALANCED  TLSPH_CELLS_4, TLSPH_RK3_FROZEN: smooth motion some 10 times as accurate
      TLSPH_PRESET_ACCURATE  TLSPH_CELLS_4, TLSPH_RK4_FROZEN: smooth motion some 20 times
    Where bodies are only a few cells thick, or clamped edges rule the error, a finer lattice with FAST gains more. Waves in
@@ -3447,6 +3450,7 @@ struct tlsph_solver {
     int audit, projection, dissipation_heats, retries, threads, bonds;
     int turns;         /* the body's spin turns F exactly (tlsphi_turn_gradient) */
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
+    int leaps;         /* TLSPH_LEAPFROG */
     int parted;        /* stresses and dissipation are gathered apart: frozen, or over different pairs */
     tlsph_integrator integrator;
     tlsph_dissipation dissipation;
@@ -3491,7 +3495,7 @@ struct tlsph_solver {
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
     tlsph_real *laplacian, *lean;     /* [JST]: l_ab a pair, 2 vectors a particle */
-    tlsph_real *held; /* frozen dissipation: T, D_J and the share of heat of each particle, D + 2; else NULL */
+    tlsph_real *held; /* frozen dissipation: T, D_J and the share of heat of each particle, D + 2; or see [LEAPFROG] */
     /* conditions */
     tlsphi_fix *fix;
     tlsphi_mirror *mirror;
@@ -4607,7 +4611,8 @@ static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
 typedef struct tlsphi_gathered {
-    tlsph_real T[3], J, heat, production, conduction, source;
+    tlsph_real T[3], damped[3]; /* damped: the dissipation's part of T, where the step asks for it */
+    tlsph_real J, heat, production, conduction, source;
     double least;
 } tlsphi_gathered;
 
@@ -4842,6 +4847,7 @@ TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t
                               &flux);
     }
     for (int i = 0; i < dim; i++) sum->T[i] += flux.D_p[i];
+    for (int i = 0; i < dim; i++) sum->damped[i] += flux.D_p[i];
     sum->J += flux.D_J;
     sum->heat += heat;
     sum->production += flux.production;
@@ -4876,7 +4882,8 @@ static void tlsphi_flux_one_by_one(const tlsph_solver *s, size_t begin, size_t e
 /* -- the pairs of a tile, slot by slot -- */
 
 typedef struct tlsphi_lane_sums {
-    tlsph_real T[3 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST], production[TLSPHI_LANES_MOST];
+    tlsph_real T[3 * TLSPHI_LANES_MOST], damped[3 * TLSPHI_LANES_MOST];
+    tlsph_real J[TLSPHI_LANES_MOST], production[TLSPHI_LANES_MOST];
     tlsph_real heat[TLSPHI_LANES_MOST], source[TLSPHI_LANES_MOST], conduction[TLSPHI_LANES_MOST];
 } tlsphi_lane_sums;
 
@@ -4957,6 +4964,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
             if (tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 0, s->jump_share, &flux))
                 tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 1, s->jump_share, &flux);
             tlsphi_add_lanes(dim, &flux, sum);
+            for (size_t i = 0; s->leaps && i < (size_t)dim * TLSPHI_LANES; i++) sum->damped[i] += flux.T[i];
         }
     }
 }
@@ -4989,6 +4997,7 @@ static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, s
     for (size_t a = begin; a < end; a++, out++) {
         const size_t l = a - base;
         for (size_t i = 0; i < D; i++) out->T[i] = sum.T[i * TLSPHI_LANES + l];
+        for (size_t i = 0; i < D; i++) out->damped[i] = sum.damped[i * TLSPHI_LANES + l];
         out->J = sum.J[l];
         out->production = sum.production[l];
         out->heat = sum.heat[l];
@@ -5001,6 +5010,7 @@ static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, s
 
 static void tlsphi_add_gathered(tlsphi_gathered *sum, const tlsphi_gathered *more) {
     for (int i = 0; i < 3; i++) sum->T[i] += more->T[i];
+    for (int i = 0; i < 3; i++) sum->damped[i] += more->damped[i];
     sum->J += more->J;
     sum->heat += more->heat;
     sum->production += more->production;
@@ -5023,6 +5033,14 @@ static void tlsphi_add_damping(const tlsph_solver *s, size_t a, tlsphi_gathered 
     for (int i = 0; i < s->dim; i++) sum->T[i] += held[i];
     sum->J += held[s->dim];
     sum->production += 2 * (heat - tlsphi_sigma(s, a) * held[s->dim]);
+}
+
+/* The leapfrog's velocity of the whole step is not known yet: keeps T_D and w.T_D. */
+static void tlsphi_hold_damping(const tlsph_solver *s, size_t a, const tlsphi_gathered *sum) {
+    tlsph_real *held = s->held + (size_t)(s->dim + 2) * a, w[3] = {0, 0, 0};
+    tlsphi_row_get(s, s->rows.w, s->dim, a, w);
+    for (int i = 0; i < s->dim; i++) held[i] = sum->damped[i];
+    held[s->dim] = tlsphi_dot(s->dim, w, held);
 }
 
 /* Relaxation of J towards det F, -r c_p/tau phi, r = min(1, r0 (c_s/c_p)^2 (1 + (ln(J/d)/0.05)^2)): slower the closer nu
@@ -5084,6 +5102,7 @@ static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
             if (passes == 2 && !s->frozen) tlsphi_add_gathered(sum, damping);
             if (passes == 2) sum->least = tlsphi_dmin(sum->least, damping->least);
             if (s->frozen) tlsphi_add_damping(s, a, sum);
+            if (s->leaps) tlsphi_hold_damping(s, a, sum);
             tlsphi_flux_store(s, a, sum, block->sums);
         }
     }
@@ -5238,7 +5257,7 @@ static void tlsphi_release_driven_power(tlsph_solver *s, tlsphi_load *load, cons
         tlsphi_driven_part(s->dim, &load->given, s->v + D * a, part);
         const tlsph_real power = tlsphi_dot(s->dim, part, s->rate_p + D * a);
         load->before[i] = tlsphi_dot(s->dim, part, part) * tlsphi_material_of(s, a)->rho / 2;
-        if (s->thermal == TLSPH_ENERGY) s->rate_E[a] -= power;
+        if (s->thermal == TLSPH_ENERGY && !s->leaps) s->rate_E[a] -= power;
         s->account.external_work -= stage->rate_weight * dt * (double)(power * s->V[a]);
     }
 }
@@ -5272,7 +5291,7 @@ static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage 
         const double gain = (double)(rho * tlsphi_dot(s->dim, wanted, wanted) / 2) -
                             stage->a * (double)(tlsphi_dot(s->dim, was, was) / (2 * rho)) -
                             stage->b * (double)load->before[i];
-        if (s->thermal == TLSPH_ENERGY) s->now.E[a] += (tlsph_real)gain;
+        if (s->thermal == TLSPH_ENERGY && !s->leaps) s->now.E[a] += (tlsph_real)gain;
         s->account.external_work += stage->after_weight * gain * (double)s->V[a];
     }
 }
@@ -5302,7 +5321,9 @@ static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, const tl
         const double was = (double)tlsphi_dot(s->dim, s->old.p + D * a, N) / rho,
                      is = (double)tlsphi_dot(s->dim, s->v + D * a, N);
         const double rate = (double)tlsphi_dot(s->dim, s->rate_p + D * a, N);
-        const double held = rho / 2 * (stage->a * was * was + stage->b * is * is) + stage->c * dt * is * rate;
+        const double held = rho / 2 * (stage->a * was * was + stage->b * is * is) +
+                            stage->c * dt * is * rate * (s->leaps ? 0.5 : 1); /* leaps: the mean of v and 0 */
+        if (s->leaps && s->thermal == TLSPH_ENERGY) s->now.E[a] += (tlsph_real)held;
         s->account.contact_loss += stage->after_weight * held * (double)s->V[a];
     }
 }
@@ -5328,17 +5349,23 @@ static void tlsphi_hold_temperature(tlsph_solver *s, tlsphi_load *load, double w
     }
 }
 
-/* Algorithm 1 line (7). */
-static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+/* Algorithm 1 line (7): momenta, then temperatures. */
+static void tlsphi_constrain(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
     const double time = s->time + stage->end * dt;
     for (size_t i = 0; i < s->loads; i++)
         if (s->load[i].given.kind == TLSPH_VELOCITY) tlsphi_drive(s, s->load + i, stage, time);
     tlsphi_apply_fixes(s);
     for (size_t i = 0; i < s->loads; i++)
         if (s->load[i].given.kind == TLSPH_WALL) tlsphi_apply_wall(s, s->load + i, stage, dt);
+}
+static void tlsphi_hold_temperatures(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
     for (size_t i = 0; i < s->loads; i++)
         if (s->load[i].given.kind == TLSPH_TEMPERATURE)
-            tlsphi_hold_temperature(s, s->load + i, stage->after_weight, time);
+            tlsphi_hold_temperature(s, s->load + i, stage->after_weight, s->time + stage->end * dt);
+}
+static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    tlsphi_constrain(s, stage, dt);
+    tlsphi_hold_temperatures(s, stage, dt);
 }
 
 /* ==== [PROJECTION] =================================================================================================
@@ -5602,9 +5629,12 @@ static void tlsphi_each_body(tlsph_solver *s, void (*solve)(tlsphi_body *body, c
         solve(s->body + body, moments);
     }
 }
-static void tlsphi_find_rigid_motion(tlsphi_projection *p) {
+static void tlsphi_find_moments(tlsphi_projection *p) {
     tlsphi_run_tasks(p->s, tlsphi_rigid_task, p);
     tlsphi_each_body(p->s, tlsphi_rigid_motion);
+}
+static void tlsphi_find_rigid_motion(tlsphi_projection *p) {
+    tlsphi_find_moments(p);
     tlsphi_run_tasks(p->s, tlsphi_relative_task, p);
 }
 static void tlsphi_project_forces(tlsphi_projection *p, void (*solve)(tlsphi_body *body, const double *moments)) {
@@ -5625,8 +5655,7 @@ static void tlsphi_settle(tlsphi_projection *p) {
     p->stage.ahead = 1;
     for (size_t i = 0; i < p->s->bodies; i++)
         for (int k = 0; k < 3; k++) p->s->body[i].debt[k] /= p->stage.z_next;
-    tlsphi_run_tasks(p->s, tlsphi_rigid_task, p);
-    tlsphi_each_body(p->s, tlsphi_rigid_motion);
+    tlsphi_find_moments(p);
     tlsphi_project_forces(p, tlsphi_pay_debt);
     if (p->s->thermal == TLSPH_ENERGY) tlsphi_run_tasks(p->s, tlsphi_settle_energy_task, p);
 }
@@ -6429,7 +6458,7 @@ typedef struct tlsphi_scheme {
     double cfl_limit;
     tlsphi_stage stage[4];
 } tlsphi_scheme;
-static const tlsphi_scheme tlsphi_schemes[4] = {
+static const tlsphi_scheme tlsphi_schemes[5] = {
     {2, 0.40, {{0, 1, 1, 0, 1, 1. / 2, 1. / 2, 1. / 2, 0, 0, 0, 0},
               {1. / 2, 1. / 2, 1. / 2, 1, 1, 1. / 2, 1, 0, 1. / 2, 0, 0, 1}}},
     {3, 0.60, {{0, 1, 1, 0, 1, 1. / 6, 1. / 6, 1. / 6, 0, -1. / 6, 0, 0},
@@ -6441,11 +6470,156 @@ static const tlsphi_scheme tlsphi_schemes[4] = {
     {4, 0.50, {{1, 0, 1. / 4, 0, 1. / 4, 0, 0, 0, 0, 0, 0, 0},
               {1, 0, 1. / 3, 1. / 4, 1. / 3, 0, 0, 0, 0, 0, 0, 0},
               {1, 0, 1. / 2, 1. / 3, 1. / 2, 0, 0, 0, 0, -1. / 2, 0, 0},
-              {1, 0, 1, 1. / 2, 1, 1, 1, 0, 1, 0, 0, 0}}}};
+              {1, 0, 1, 1. / 2, 1, 1, 1, 0, 1, 0, 0, 0}}},
+    {1, 0.50, {{1, 0, 1, 1. / 2, 1, 1, 1, 1, 0, 0, 1. / 2, 0}}}};
 
 TLSPHI_DEF tlsph_real tlsph_cfl_limit(tlsph_integrator integrator) {
-    return (unsigned)integrator < 4 ? (tlsph_real)tlsphi_schemes[integrator].cfl_limit : 0;
+    return (unsigned)integrator <= TLSPH_LEAPFROG ? (tlsph_real)tlsphi_schemes[integrator].cfl_limit : 0;
 }
+
+/* ==== [LEAPFROG] ===================================================================================================
+   With v = p/rho and the mean velocity m = (v^n + v^{n+1})/2 of a step:
+     drift  x, F, J, H (E) by dt/2 with grad v^n:  the state at the half, and its stress P
+     kick   p^{n+1} = p^n + dt f(P, v^n), then the constraints
+     drift  x, F, J, H (E) from state n by dt with grad m, and with P, F, H of the half
+   One gather of forces a step instead of two, at steps 1.7 times as long. As it is made of P of the half and of m, the
+   work of the stresses, V P : grad m = -T.m, and the change of the kinetic energy, m.(p^{n+1} - p^n), balance to round-off
+   in E. Angular momentum changes by dt x^{n+1/2} x f exactly, so that the projection sees the positions of the half.
+   Dissipation and conduction are evaluated with v^n and theta^n, first order in the step; what the dissipation takes
+   from the motion is -m.T_D, so the particles get that heat. */
+
+/* u = u_old + C rate of all that grad v moves; J and E from their present value if `on`. */
+typedef struct tlsphi_leap_move {
+    tlsph_solver *s;
+    tlsph_real C;
+    int on;
+} tlsphi_leap_move;
+
+static void tlsphi_drift_task(void *arg, size_t i) {
+    const tlsphi_leap_move *drift = (const tlsphi_leap_move *)arg;
+    tlsph_solver *s = drift->s;
+    const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
+    const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
+    for (size_t a = begin; s->has_H && a < end; a++) {
+        if (s->dim == 3) tlsphi_update_cofactor(s, a, 3, 0, C);
+        else tlsphi_update_cofactor(s, a, 2, 0, C);
+    }
+    tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, 0, C);
+    tlsphi_combine(s->now.F, s->old.F, s->rate_F, dd * begin, dd * end, 0, C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, on, C);
+    if (s->thermal == TLSPH_ENERGY) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, on, C);
+}
+static void tlsphi_kick_task(void *arg, size_t i) {
+    const tlsphi_leap_move *kick = (const tlsphi_leap_move *)arg;
+    tlsph_solver *s = kick->s;
+    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
+    tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, 0, kick->C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, 0, kick->C);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, 0, kick->C);
+}
+/* v becomes m. */
+static void tlsphi_mean_velocity_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = block->begin; a < block->end; a++) {
+        const tlsph_real half = 1 / (2 * tlsphi_material_of(s, a)->rho);
+        tlsph_real *v = s->v + D * a;
+        for (size_t k = 0; k < D; k++) v[k] = half * (s->old.p[D * a + k] + s->now.p[D * a + k]);
+        tlsphi_row_put(s, s->rows.v, s->dim, a, v);
+        if (!s->projection) tlsphi_row_put(s, s->rows.w, s->dim, a, v);
+    }
+}
+/* The kinetic part of E, and the heat of the dissipation as far as m differs from v^n. */
+static void tlsphi_mean_work_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim;
+    for (size_t a = block->begin; a < block->end; a++) {
+        const tlsph_real *held = s->held + (D + 2) * a, *p = s->now.p + D * a, *old = s->old.p + D * a;
+        tlsph_real w[3] = {0, 0, 0};
+        tlsphi_row_get(s, s->rows.w, s->dim, a, w);
+        const tlsph_real heat = held[D] - tlsphi_dot(s->dim, w, held);
+        block->sums[TLSPHI_SUM_DISSIPATION] += (double)heat;
+        if (!s->thermal) continue;
+        const tlsph_real theta = *tlsphi_theta(s, a), density = heat / s->V[a];
+        block->sums[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)(heat / theta);
+        if (s->thermal == TLSPH_ENTROPY) s->rate_E[a] = s->dissipation_heats ? density / theta : 0;
+        else s->rate_E[a] += density;
+        for (size_t k = 0; s->thermal == TLSPH_ENERGY && k < D; k++) s->now.E[a] += s->v[D * a + k] * (p[k] - old[k]);
+    }
+}
+/* The work of loads has been taken with v^n: the rest of that with m. */
+static void tlsphi_mean_work_of_loads(tlsph_solver *s, double dt) {
+    const size_t D = (size_t)s->dim;
+    for (size_t i = 0; i < s->loads; i++) {
+        const tlsphi_load *load = s->load + i;
+        const tlsph_condition_kind kind = load->given.kind;
+        if (kind == TLSPH_WALL || tlsphi_is_thermal(kind)) continue;
+        for (size_t k = 0; k < load->given.count; k++) {
+            const size_t a = load->inner[k];
+            const tlsph_real *rate = s->rate_p + D * a;
+            tlsph_real change[3] = {0, 0, 0}, force[3] = {0, 0, 0};
+            for (size_t l = 0; l < D; l++)
+                change[l] = s->v[D * a + l] - s->old.p[D * a + l] / tlsphi_material_of(s, a)->rho;
+            if (kind == TLSPH_VELOCITY) {
+                tlsphi_driven_part(s->dim, &load->given, rate, force);
+                for (size_t l = 0; l < D; l++) force[l] *= -s->V[a];
+            } else tlsphi_load_force(s, load, k, force);
+            s->account.external_work += dt * (double)tlsphi_dot(s->dim, force, change);
+        }
+    }
+}
+static void tlsphi_leap_gradients(tlsphi_projection *p, int damps) {
+    tlsph_solver *s = p->s;
+    s->damps = damps;
+    if (s->projection) tlsphi_find_rigid_motion(p);
+    tlsphi_run(s, tlsphi_gradient_block);
+    if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block);
+}
+/* Rates of p, and of J and E as far as they do not come from grad v. */
+static void tlsphi_leap_forces(tlsphi_projection *p) {
+    tlsph_solver *s = p->s;
+    if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block); /* the stress of the half */
+    if (s->laplacian) tlsphi_run(s, tlsphi_laplacian_block);
+    if (s->rate_J) memset(s->rate_J, 0, s->n * sizeof *s->rate_J);
+    if (s->rate_E) memset(s->rate_E, 0, s->n * sizeof *s->rate_E);
+    tlsphi_run(s, tlsphi_flux_block);
+    if (s->projection) {
+        tlsphi_find_moments(p);
+        tlsphi_project(p);
+    }
+    tlsphi_image_forces(s);
+    tlsphi_apply_loads(s, &p->stage, p->dt);
+}
+/* Returns the first failed block or NULL. */
+static const tlsphi_block *tlsphi_leap(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    tlsphi_projection projection;
+    tlsphi_leap_move drift;
+    projection.stage = *stage;
+    projection.dt = dt;
+    drift.s = projection.s = s;
+    drift.on = 0;
+    drift.C = (tlsph_real)(dt / 2);
+    tlsphi_leap_gradients(&projection, 1);
+    tlsphi_run_tasks(s, tlsphi_drift_task, &drift);
+    if (s->now.plastic) tlsphi_run(s, tlsphi_flow_block);
+    const tlsphi_block *bad = tlsphi_evaluate(s);
+    if (bad) return bad;
+    tlsphi_leap_forces(&projection);
+    drift.C = (tlsph_real)dt;
+    tlsphi_run_tasks(s, tlsphi_kick_task, &drift);
+    tlsphi_constrain(s, stage, dt);
+    tlsphi_run(s, tlsphi_mean_velocity_block);
+    tlsphi_mean_work_of_loads(s, dt);
+    tlsphi_leap_gradients(&projection, 0);
+    tlsphi_run(s, tlsphi_mean_work_block);
+    tlsphi_collect_sums(s, dt);
+    drift.on = 1;
+    tlsphi_run_tasks(s, tlsphi_drift_task, &drift);
+    if (s->now.plastic) tlsphi_run(s, tlsphi_flow_block);
+    tlsphi_hold_temperatures(s, stage, dt);
+    return tlsphi_evaluate(s);
+}
+
+/* ==== [ALGORITHM] ==================================================================================================
+   Algorithm 1 on a page: from state n to n + 1, with retries and the choice of the step. */
 
 /* Algorithm 1, from state n to n + 1. */
 static tlsph_result tlsphi_give_up(tlsph_solver *s, const tlsphi_block *bad, int split) {
@@ -6489,6 +6663,11 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     }
     for (int k = 0; k < scheme->stages; k++) {
         const tlsphi_stage *stage = scheme->stage + k;
+        if (s->leaps) {
+            const tlsphi_block *bad = tlsphi_leap(s, stage, dt);
+            if (bad) return tlsphi_give_up(s, bad, split);
+            continue;
+        }
         s->damps = k == 0 || !s->frozen;
         tlsphi_right_hand_side(s, stage, dt);         /* (4) rates, (5) projection            */
         tlsphi_evolve(s, stage, dt);                  /* (6) u = a u_old + b u + c dt L       */
@@ -7060,7 +7239,7 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"jump_share", (double)d->jump_share, 0, 100, "0 to 100"},
         {"drift_relaxation", (double)d->drift_relaxation, 0, 100, "0 to 100"},
         {"conduction", (double)d->conduction, TLSPH_COMPACT, TLSPH_DOUBLE_GRADIENT, "a tlsph_conduction"},
-        {"integrator", (double)d->integrator, TLSPH_RK2, (double)(d->scheme ? TLSPH_RK2 : TLSPH_RK4_FROZEN),
+        {"integrator", (double)d->integrator, TLSPH_RK2, (double)(d->scheme ? TLSPH_RK2 : TLSPH_LEAPFROG),
          "a tlsph_integrator; TLSPH_RK2 with TLSPH_INCOMPRESSIBLE"},
         {"scheme", (double)d->scheme, TLSPH_EXPLICIT, TLSPH_INCOMPRESSIBLE, "a tlsph_scheme"},
         {"thermal", (double)d->thermal, TLSPH_ISOTHERMAL, (double)(d->scheme ? TLSPH_ISOTHERMAL : TLSPH_ENTROPY),
@@ -7551,7 +7730,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->incompressible = d->scheme == TLSPH_INCOMPRESSIBLE;
     s->choice = d->incompressible;
     s->laplacian_share = d->incompressible.laplacian;
-    s->frozen = d->integrator >= TLSPH_RK3_FROZEN && d->dissipation != TLSPH_NO_DISSIPATION;
+    s->leaps = d->integrator == TLSPH_LEAPFROG;
+    s->frozen = d->integrator >= TLSPH_RK3_FROZEN && !s->leaps && d->dissipation != TLSPH_NO_DISSIPATION;
     s->damps = 1;
     s->parted = s->frozen || plan->lattice != NULL;
     s->images = plan->images;
@@ -7633,7 +7813,7 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->v = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
-    if (s->frozen) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
+    if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
     if (s->step_rule == TLSPH_STEP_BY_PAIR) s->least_stretch = TLSPHI_TAKE(arena, tlsph_real, n);
     if (s->dissipation == TLSPH_JST) s->lean = TLSPHI_TAKE(arena, tlsph_real, 2 * D * n);
     if (s->has_J) s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
@@ -8142,7 +8322,8 @@ TLSPHI_DEF void tlsph_preset(tlsph_desc *d, tlsph_preset_name name) {
     const int fourth = name != TLSPH_PRESET_FAST && d->dissipation != TLSPH_JST;
     if (lattice) d->operator_kind = fourth ? TLSPH_CELLS_4 : TLSPH_CELLS;
     d->sharp_gradients = 0;
-    d->integrator = name == TLSPH_PRESET_ACCURATE ? TLSPH_RK4_FROZEN : TLSPH_RK3_FROZEN;
+    static const tlsph_integrator integrators[3] = {TLSPH_LEAPFROG, TLSPH_RK3_FROZEN, TLSPH_RK4_FROZEN};
+    d->integrator = integrators[name];
     d->cfl = tlsph_cfl_limit(d->integrator);
     d->conduction_stages = 9;
 }

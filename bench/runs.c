@@ -32,7 +32,8 @@ const study_word study_words[] = {
     { "undamped", "no dissipation" }, { "jst", "JST dissipation (002)" }, { "unprojected", "no projection" },
     { "double", "double-gradient conduction" }, { "split", "conduction in 9 stages of its own" },
     { "cfl0.4", "CFL 0.4" }, { "ssprk3", "3 stages, CFL 0.5" }, { "rk3", "3 stages, dissipation once, CFL 0.5" },
-    { "rk4", "4 stages, dissipation once, CFL 0.5" }, { "fast", "preset" }, { "balanced", "preset" },
+    { "rk4", "4 stages, dissipation once, CFL 0.5" }, { "leapfrog", "forces once a step, CFL 0.5" },
+    { "fast", "preset" }, { "balanced", "preset" },
     { "accurate", "preset" }, { NULL, NULL } };
 
 typedef struct setting { const char *word; size_t offset; int value; } setting;
@@ -48,7 +49,8 @@ static const setting settings[] = {
     SET("undamped", dissipation, TLSPH_NO_DISSIPATION), SET("jst", dissipation, TLSPH_JST),
     SET("unprojected", projection, 0), SET("double", conduction, TLSPH_DOUBLE_GRADIENT),
     SET("split", conduction_stages, 9), SET("ssprk3", integrator, TLSPH_SSP_RK3),
-    SET("rk3", integrator, TLSPH_RK3_FROZEN), SET("rk4", integrator, TLSPH_RK4_FROZEN) };
+    SET("rk3", integrator, TLSPH_RK3_FROZEN), SET("rk4", integrator, TLSPH_RK4_FROZEN),
+    SET("leapfrog", integrator, TLSPH_LEAPFROG) };
 #undef SET
 
 /* Words that set more than one integer. */
@@ -60,7 +62,8 @@ static int apply_word(const char *word, scene_options *o) {
         known = 1;
     }
     if (!strcmp(word, "26")) o->support = 0.9; /* neighbours within 1.8 spacings */
-    if (!strcmp(word, "ssprk3") || !strcmp(word, "rk3") || !strcmp(word, "rk4")) o->cfl = 0.5;
+    if (!strcmp(word, "ssprk3") || !strcmp(word, "rk3") || !strcmp(word, "rk4") || !strcmp(word, "leapfrog"))
+        o->cfl = 0.5;
     if (!strcmp(word, "cfl0.4")) { o->cfl = 0.4; known = 1; }
     return known || scene_options_preset(o, word);
 }

@@ -39,6 +39,7 @@ static const choice choices[] = {
     { "cells4 rk3", "rk3", "cells of order 4 with rk3", ON_ALL },
     { "cfl0.4", "", "CFL 0.4 for 0.3", ON_ALL }, { "ssprk3", "", "SSP RK3 at CFL 0.5", ON_ALL },
     { "rk3", "", "rk3: dissipation once, CFL 0.5", ON_ALL }, { "rk4", "", "rk4: dissipation once, CFL 0.5", ON_ALL },
+    { "leapfrog", "", "leapfrog, CFL 0.5", ON_ALL },
     { "double", "", "double-gradient conduction", ON_THERMAL }, { "split", "", "conduction in 9 stages of its own", ON_THERMAL } };
 static const choice in_float[] = { { "", "", "float", ON_ALL }, { "26", "26", "float with 26 neighbours", ON_ALL },
                                    { "sharp rk3", "sharp rk3", "float with sharp rk3", ON_ALL } };
@@ -48,7 +49,7 @@ enum { CHOICES = sizeof choices / sizeof *choices, IN_FLOAT = sizeof in_float / 
 static const char *const candidates[] = { "", "fast", "balanced", "accurate", "sharp rk3 split", "sharp rk4 split" };
 enum { CANDIDATES = sizeof candidates / sizeof *candidates };
 static const char *const operators[] = { "", "sharp", "cells4", "26", "26 cubic" };
-static const char *const integrators[] = { "", "ssprk3", "rk3", "rk4" };
+static const char *const integrators[] = { "", "ssprk3", "rk3", "rk4", "leapfrog" };
 static const char *const dissipations[] = { "", "unlimited", "first" };
 static const char *const unknowns[] = { "", "J", "HJ" };
 

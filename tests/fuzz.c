@@ -223,7 +223,7 @@ static void read_desc(reader *r, tlsph_desc *d)
     d->dissipation = (tlsph_dissipation)choice(r, TLSPH_NO_DISSIPATION + 1);
     d->conduction = (tlsph_conduction)choice(r, 2);
     d->volume_coupling = (tlsph_volume_coupling)choice(r, 2);
-    d->integrator = (tlsph_integrator)choice(r, TLSPH_RK4_FROZEN + 1);
+    d->integrator = (tlsph_integrator)choice(r, TLSPH_LEAPFROG + 1);
     d->projection = byte(r) % 2;
     d->sharp_gradients = byte(r) % 8 == 0;
     d->audit = byte(r) % 4 == 0;

@@ -208,6 +208,7 @@ static tlsph_desc moving_block_desc(const moving_block *s, const own_cloud *clou
     desc.material_count = 1;
     desc.unknowns = s->unknowns;
     desc.thermal = s->thermal;
+    desc.integrator = s->integrator;
     desc.threads = s->threads;
     desc.audit = s->audit;
     desc.run = s->run;

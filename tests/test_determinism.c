@@ -82,6 +82,8 @@ TEST(order_of_tasks_does_not_matter)
     s.unknowns = TLSPH_PFJ;
     s.thermal = TLSPH_ENTROPY;
     check_orders(&s);
+    s.integrator = TLSPH_LEAPFROG;
+    check_orders(&s);
 }
 
 TEST(number_of_threads_does_not_matter)

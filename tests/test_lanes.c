@@ -52,7 +52,7 @@ static double compare(moving_block s, double speed, int steps)
     return worst;
 }
 
-static void compare_all(int dimension, double jitter, double speed, double mooney)
+static void compare_all(int dimension, double jitter, double speed, double mooney, tlsph_integrator integrator)
 {
     static const tlsph_material_kind materials[] = { TLSPH_NEO_HOOKEAN, TLSPH_MEE, TLSPH_MIE_GRUNEISEN };
     double worst = 0;
@@ -67,6 +67,7 @@ static void compare_all(int dimension, double jitter, double speed, double moone
                 s.material = materials[m];
                 s.jitter = jitter;
                 s.mooney = mooney;
+                s.integrator = integrator;
                 const double one = compare(s, speed, 3);
                 if (!CHECK(one < tolerance(s.thermal))) printf("    unknowns %d, thermal %d, material %d: %.1e\n", u, t, m, one);
                 worst = fmax(worst, one);
@@ -74,10 +75,11 @@ static void compare_all(int dimension, double jitter, double speed, double moone
     REPORT("largest relative difference %.1e", worst);
 }
 
-TEST(lattice_in_3d) { compare_all(3, 0, 0.5, 0); }
-TEST(lattice_in_2d) { compare_all(2, 0, 0.5, 0.25); }
-TEST(cloud_in_3d) { compare_all(3, 0.2, 0.5, 0); }
-TEST(cloud_in_2d) { compare_all(2, 0.2, 0.5, 0); }
-TEST(fronts) { compare_all(3, 0, 20, 0.25); } /* faster than TLSPH_FRONT_LOW of the p speed between neighbours */
+TEST(lattice_in_3d) { compare_all(3, 0, 0.5, 0, TLSPH_RK2); }
+TEST(lattice_in_2d) { compare_all(2, 0, 0.5, 0.25, TLSPH_RK2); }
+TEST(cloud_in_3d) { compare_all(3, 0.2, 0.5, 0, TLSPH_RK2); }
+TEST(cloud_in_2d) { compare_all(2, 0.2, 0.5, 0, TLSPH_RK2); }
+TEST(fronts) { compare_all(3, 0, 20, 0.25, TLSPH_RK2); } /* faster than TLSPH_FRONT_LOW of the p speed between neighbours */
+TEST(leapfrog) { compare_all(3, 0, 0.5, 0, TLSPH_LEAPFROG); }
 
-SUITE(lanes, ENTRY(lattice_in_3d), ENTRY(lattice_in_2d), ENTRY(cloud_in_3d), ENTRY(cloud_in_2d), ENTRY(fronts))
+SUITE(lanes, ENTRY(lattice_in_3d), ENTRY(lattice_in_2d), ENTRY(cloud_in_3d), ENTRY(cloud_in_2d), ENTRY(fronts), ENTRY(leapfrog))

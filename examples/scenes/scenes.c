@@ -67,7 +67,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = choice("step-rule", &o->step_rule, "particle|pair|pair-linear", "time step (pair: 002-31, 32)");
     table[i++] = choice("volume", &o->volume_coupling, "split|printed", "how an evolved J enters the energy");
     table[i++] = choice("conduction", &o->conduction, "compact|double", "heat conduction's stencil");
-    table[i++] = choice("integrator", &o->integrator, "rk2|ssprk3|rk3frozen|rk4frozen", "time integrator");
+    table[i++] = choice("integrator", &o->integrator, "rk2|ssprk3|rk3frozen|rk4frozen|leapfrog", "time integrator");
     table[i++] = whole("conduction-stages", &o->conduction_stages, 0, 1000, "3 or more: conduction in stages of its own");
     table[i++] = whole("sharp", &o->sharp, 0, 1, "1: gradients of fourth-order dispersion (lattices only)");
     table[i++] = whole("projection", &o->projection, 0, 1, "1: conserve angular momentum exactly (000-79 to 82)");
