@@ -78,8 +78,10 @@ static void check(const run *r) {
     ex_result("u_x", u[0], "m");
     ex_result("u_z", u[2], "m");
     ex_result("largest_pressure_oscillation", r->oscillation, "1");
-    ex_check_below("u_y_by_u_z", fabs(u[1] / u[2]), 1e-8);
-    ex_check_below("asymmetry", r->asymmetry, 1e-8);
+    if (!r->body.parameters.cloud) { /* clouds have no symmetry */
+        ex_check_below("u_y_by_u_z", fabs(u[1] / u[2]), 1e-8);
+        ex_check_below("asymmetry", r->asymmetry, 1e-8);
+    }
     ex_result("jacobian_drift", r->drift, "1"); /* largest at the clamped edges of the bore, which are singular */
     if (r->body.parameters.options.thermal == TLSPH_ENERGY)
         ex_check_below("energy_residual_by_work", r->residual / r->work, 1e-10);
@@ -108,6 +110,7 @@ static int run_gripper(const gripper_parameters *p) {
 int main(int argc, char **argv) {
     gripper_parameters p;
     const ex_option own[] = {
+        { "cloud", EX_FLAG, &p.cloud, NULL, NULL, 0, 0, "an irregular cloud on the true surface, closed operator" },
         { "spacing", EX_REAL, &p.spacing, "m", NULL, 0.002, 0.02, "0.02 by a whole number" },
         { "traction", EX_REAL, &p.traction, "Pa", NULL, -1e5, 1e5, "on the ends of the arms, upward" } };
     double cells;

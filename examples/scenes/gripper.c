@@ -24,6 +24,16 @@ static int inside(void *user, const tlsph_real X[3]) {
     return r >= p->bore && (r <= p->radius || fmin(x, y) <= p->width / 2);
 }
 
+/* Signed distance from the same body, right near the surface. */
+static tlsph_real distance(void *user, const tlsph_real X[3]) {
+    const gripper_parameters *p = user;
+    const tlsph_real w = (tlsph_real)(p->width / 2), a = (tlsph_real)p->arm, t = (tlsph_real)(p->thickness / 2);
+    const tlsph_real along[3] = { a, w, t }, across[3] = { w, a, t }, back[3] = { -a, -w, -t }, left[3] = { -w, -a, -t };
+    const double r = sqrt((double)(X[0] * X[0] + X[1] * X[1])), slab = fabs((double)X[2]) - p->thickness / 2;
+    const double arms = fmin((double)tlsph_distance_box(X, back, along), (double)tlsph_distance_box(X, left, across));
+    return (tlsph_real)fmax(fmin(fmax(r - p->radius, slab), arms), p->bore - r);
+}
+
 /* Faces of the bore: inside the cylinder, normal toward the axis. */
 static double bore_share(void *user, const scene_face *face) {
     const gripper_parameters *p = user;
@@ -41,8 +51,11 @@ static void add_bore(scene_setup *setup, tlsph_condition_kind kind, gripper_para
 
 static void add_end(scene_setup *setup, const gripper_parameters *p, int axis, double place) {
     tlsph_condition *condition = scene_add_plane(setup, TLSPH_TRACTION, axis, place);
-    scene_share_area(setup, condition, p->width * p->thickness);
-    condition->normal[axis] = 0; /* the areas are given */
+    condition->normal[axis] = (tlsph_real)(place > 0 ? 1 : -1);
+    if (!p->cloud) {
+        scene_share_area(setup, condition, p->width * p->thickness);
+        condition->normal[axis] = 0; /* the areas are given */
+    }
     condition->value[2] = (tlsph_real)p->traction;
 }
 
@@ -55,6 +68,7 @@ static void warm_ends(const void *scene, const tlsph_real X[3], scene_state *sta
 tlsph_result gripper_create(const gripper_parameters *p, gripper *out, tlsph_error *error) {
     tlsph_material material = scene_paper_material(TLSPH_MIE_GRUNEISEN);
     tlsph_fill fill = tlsph_fill_default(3);
+    scene_options options = p->options;
     scene_setup setup;
     tlsph_result result;
     memset(out, 0, sizeof *out);
@@ -67,11 +81,12 @@ tlsph_result gripper_create(const gripper_parameters *p, gripper *out, tlsph_err
     fill.origin[2] = (tlsph_real)(-p->thickness / 2);
     fill.size[2] = (tlsph_real)p->thickness;
     fill.spacing = (tlsph_real)p->spacing;
+    if (p->cloud) scene_options_scatter(&options, &fill, distance, &out->parameters);
     scene_begin(&setup, &fill, &material, error);
     for (int i = 0; i < 4; i++) add_end(&setup, p, i / 2, i % 2 ? p->arm : -p->arm);
     add_bore(&setup, TLSPH_CLAMPED, &out->parameters);
     add_bore(&setup, TLSPH_TEMPERATURE, &out->parameters);
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, warm_ends);
     if (result != TLSPH_OK) { scene_destroy(&out->body); return result; }
     out->probe = scene_nearest(&out->body.cloud.particles, p->arm, 0, -p->thickness / 2);

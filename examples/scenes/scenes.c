@@ -109,6 +109,15 @@ void scene_options_cloud(scene_options *options, tlsph_fill *fill) {
     fill->voronoi = 1;
 }
 
+void scene_options_scatter(scene_options *options, tlsph_fill *fill, tlsph_length_fn distance, void *user) {
+    if (options->operator_kind == TLSPH_CELLS) options->operator_kind = TLSPH_CORRECTED_KERNEL;
+    scene_options_cloud(options, fill);
+    fill->shape = TLSPH_DISTANCE;
+    fill->placement = TLSPH_SCATTERED;
+    fill->distance = distance;
+    fill->distance_user = user;
+}
+
 void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->unknowns = (tlsph_unknowns)options->unknowns;
     desc->thermal = (tlsph_thermal)options->thermal;

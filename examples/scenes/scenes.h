@@ -42,6 +42,8 @@ void scene_options_default(scene_options *options);
 void scene_option_table(scene_options *options, ex_option *table);
 /* Irregular clouds: the closed operator instead of the default one, with the volumes and areas that it needs. */
 void scene_options_cloud(scene_options *options, tlsph_fill *fill);
+/* The same for scenes whose own choice is cells: a cloud scattered in the body of a signed distance. */
+void scene_options_scatter(scene_options *options, tlsph_fill *fill, tlsph_length_fn distance, void *user);
 void scene_options_apply(const scene_options *options, tlsph_desc *desc);
 /* tlsph_preset by name: fast, balanced, accurate. 0 for another name, without a change. */
 int scene_options_preset(scene_options *options, const char *name);
@@ -106,7 +108,7 @@ tlsph_result scene_surface(const tlsph_cloud *cloud, scene_face_fn visit, void *
    curved surface less than the staircase has. 0: not part of the set. */
 typedef double (*scene_share_fn)(void *user, const scene_face *face);
 /* A condition on a part of the surface, each face's share split among its corners, and scaled to add up to `area` if this
-   is known (else 0). */
+   is known (else 0). On clouds with areas the particles' own stand for faces. */
 tlsph_condition *scene_add_surface(scene_setup *setup, tlsph_condition_kind kind, scene_share_fn share, void *user,
                                    double area);
 
@@ -715,6 +717,7 @@ typedef struct gripper_parameters {
     double arm, width, thickness, radius, bore; /* m */
     double traction;      /* Pa, along Z on the ends of the arms */
     double cold, hot;     /* K: wall of the bore, for ever; ends of the arms, at t = 0 */
+    int cloud;            /* 1: an irregular cloud with particles on the true surface, closed operator */
 } gripper_parameters;
 
 typedef struct gripper {
@@ -743,6 +746,7 @@ typedef struct spherical_ball_parameters {
     double cap;           /* degrees from the top */
     double speed;         /* m/s, downward */
     double heat_flux;     /* W/m^2 on the inner surface, positive = leaves */
+    int cloud;            /* 1: an irregular cloud with particles on the true surface, closed operator */
 } spherical_ball_parameters;
 
 typedef struct spherical_ball {

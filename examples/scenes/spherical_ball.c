@@ -22,11 +22,13 @@ void spherical_ball_default(spherical_ball_parameters *p) {
 
 static double radius(const double X[3]) { return sqrt(X[0] * X[0] + X[1] * X[1] + X[2] * X[2]); }
 
-/* Within `degrees` of the direction with this azimuth and latitude? |Y| makes the pattern symmetric to the last bit. */
-static int near_direction(const double X[3], double azimuth, double latitude, double degrees) {
+/* Cosine of the angle between X and this azimuth and latitude. |Y| makes the pattern symmetric to the last bit. */
+static double cosine(const double X[3], double azimuth, double latitude) {
     const double a = azimuth * SCENE_PI / 180, b = latitude * SCENE_PI / 180;
-    const double cosine = (X[0] * cos(a) * cos(b) + fabs(X[1]) * sin(a) * cos(b) + X[2] * sin(b)) / radius(X);
-    return cosine >= cos(degrees * SCENE_PI / 180);
+    return (X[0] * cos(a) * cos(b) + fabs(X[1]) * sin(a) * cos(b) + X[2] * sin(b)) / radius(X);
+}
+static int near_direction(const double X[3], double azimuth, double latitude, double degrees) {
+    return cosine(X, azimuth, latitude) >= cos(degrees * SCENE_PI / 180);
 }
 
 /* Holes at azimuth 0, 90, 180, 270 on the equator and 0, 120, 240 above; those at negative Y are mirror images. */
@@ -42,6 +44,21 @@ static int inside(void *user, const tlsph_real at[3]) {
     const spherical_ball_parameters *p = user;
     const double X[3] = { (double)at[0], (double)at[1], (double)at[2] }, r = radius(X);
     return r >= p->inner_radius && r <= p->inner_radius + p->wall && !in_hole(p, X);
+}
+
+/* Signed distance from the same body, right near the surface; holes are cones. */
+static double cone(const double X[3], double azimuth, double latitude, double degrees) {
+    const double c = fmax(-1, fmin(1, cosine(X, azimuth, latitude))), angle = acos(c) - degrees * SCENE_PI / 180;
+    return degrees > 0 ? radius(X) * sin(fmin(SCENE_PI / 2, angle)) : HUGE_VAL;
+}
+static tlsph_real distance(void *user, const tlsph_real at[3]) {
+    const spherical_ball_parameters *p = user;
+    const double X[3] = { (double)at[0], (double)at[1], (double)at[2] }, r = radius(X);
+    double hole = r;
+    if (!(r > 0)) return (tlsph_real)p->inner_radius;
+    for (int i = 0; i < 3; i++) hole = fmin(hole, cone(X, 90 * i, 0, p->holes[0]));
+    for (int i = 0; i < 2; i++) hole = fmin(hole, cone(X, 120 * i, p->latitude, p->holes[1]));
+    return (tlsph_real)fmax(fmax(p->inner_radius - r, r - p->inner_radius - p->wall), -hole);
 }
 
 /* The inner staircase; faces along the edges of holes look sideways and count little, those that look outward not. */
@@ -75,6 +92,7 @@ tlsph_result spherical_ball_create(const spherical_ball_parameters *p, spherical
     const tlsph_material material = rubber();
     const double outer = p->inner_radius + p->wall;
     tlsph_fill fill = tlsph_fill_default(3);
+    scene_options options = p->options;
     tlsph_condition *heat;
     scene_setup setup;
     tlsph_result result;
@@ -85,11 +103,12 @@ tlsph_result spherical_ball_create(const spherical_ball_parameters *p, spherical
     fill.inside_user = &out->parameters;
     for (int i = 0; i < 3; i++) { fill.origin[i] = (tlsph_real)-outer; fill.size[i] = (tlsph_real)(2 * outer); }
     fill.spacing = (tlsph_real)(p->wall / p->n);
+    if (p->cloud) scene_options_scatter(&options, &fill, distance, &out->parameters);
     scene_begin(&setup, &fill, &material, error);
     heat = scene_add_surface(&setup, TLSPH_HEAT_FLUX, inner_share, &out->parameters, 0);
     heat->value[0] = (tlsph_real)p->heat_flux;
     for (size_t i = 0; i < heat->count; i++) out->inner_area += (double)heat->areas[i];
-    result = scene_end(&setup, &p->options, &out->body, error);
+    result = scene_end(&setup, &options, &out->body, error);
     if (result == TLSPH_OK) result = scene_set_state(&out->body, out, punched);
     if (result != TLSPH_OK) { scene_destroy(&out->body); return result; }
     out->probe = scene_nearest(&out->body.cloud.particles, 0, 0, outer);

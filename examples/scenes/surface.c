@@ -83,6 +83,24 @@ static void share_face(void *user, const scene_face *face) {
     for (int i = 0; i < 4; i++) s->areas[face->corner[i]] += part / 4;
 }
 
+/* On a cloud each particle's own area stands for the face; those that look sideways are none of it. */
+static void share_cloud(const tlsph_particles *particles, sharing *s) {
+    for (size_t a = 0; a < particles->count; a++) {
+        scene_face face;
+        double size = 0;
+        memset(&face, 0, sizeof face);
+        for (size_t k = 0; k < 3; k++) {
+            face.middle[k] = (double)particles->positions[3 * a + k];
+            face.area[k] = (double)particles->areas[3 * a + k];
+            size += face.area[k] * face.area[k];
+        }
+        const double share = size > 0 ? s->share(s->user, &face) : 0;
+        if (!(share > 0.2 * sqrt(size))) continue;
+        s->areas[a] = share;
+        s->sum += share;
+    }
+}
+
 tlsph_condition *scene_add_surface(scene_setup *setup, tlsph_condition_kind kind, scene_share_fn share, void *user,
                                    double area) {
     const size_t count = setup->body.cloud.particles.count;
@@ -93,7 +111,8 @@ tlsph_condition *scene_add_surface(scene_setup *setup, tlsph_condition_kind kind
     sharing s = { share, user, sums, 0 };
     if (!list || !areas || !sums) return condition;
     memset(sums, 0, count * sizeof *sums);
-    setup->result = scene_surface(&setup->body.cloud, share_face, &s);
+    if (setup->body.cloud.particles.areas) share_cloud(&setup->body.cloud.particles, &s);
+    else setup->result = scene_surface(&setup->body.cloud, share_face, &s);
     for (size_t a = 0; a < count && s.sum > 0; a++) {
         if (!(sums[a] > 0)) continue;
         list[condition->count] = (uint32_t)a;
