@@ -9721,7 +9721,7 @@ static tlsph_result tlsphi_sample_lines(tlsphi_sampler *s) {
     for (uint32_t v = 0; !r && v < s->mesh.vertices; v++) {
         double X[3];
         tlsphi_vertex_point(&s->mesh, v, X);
-        if (l.corner[v]) r = tlsphi_sample_try(s, X, 0, 0.3);
+        if (l.corner[v]) r = tlsphi_sample_try(s, X, 0, 0.6); /* rims of contours bend at many vertices */
     }
     for (int loops = 0; loops < 2; loops++) /* lines between corners, then closed ones */
         for (uint32_t e = 0; !r && e < l.count; e++) {
