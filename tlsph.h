@@ -412,7 +412,7 @@ typedef struct tlsph_desc {
     int tight_closure;                   /* 1: TLSPH_CLOSED exact for linear fields to 1e-3, not 2e-2, at ten times the cost; default 0 */
     int mirror_gradients;                /* 1: gradients know rollers and tangent planes; default 1 */
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
-    int projection;                      /* 1: angular-momentum projection (000-79 to 82); default 1 */
+    int projection;                      /* 1: keeps angular momentum (000-79 to 82); default 1. 0: [PROJECTION] */
     tlsph_integrator integrator;         /* default TLSPH_RK2 */
     tlsph_scheme scheme;                 /* default TLSPH_EXPLICIT */
     tlsph_incompressible incompressible; /* for TLSPH_INCOMPRESSIBLE */
@@ -3366,11 +3366,7 @@ typedef struct tlsphi_state {
 } tlsphi_state;
 
 enum {
-    TLSPHI_SUM_DISSIPATION,
-    TLSPHI_SUM_DISSIPATION_ENTROPY,
-    TLSPHI_SUM_CONDUCTION_ENTROPY,
-    TLSPHI_SUM_LEAST,
-    TLSPHI_SUMS
+    TLSPHI_SUM_DISSIPATION, TLSPHI_SUM_DISSIPATION_ENTROPY, TLSPHI_SUM_CONDUCTION_ENTROPY, TLSPHI_SUM_LEAST, TLSPHI_SUMS
 };
 enum { TLSPHI_MOMENTS = 16 }; /* sums of the projection, see [PROJECTION] */
 
@@ -5391,7 +5387,11 @@ static void tlsphi_impose(tlsph_solver *s, const tlsphi_stage *stage, double dt)
    Mirror planes. The rules of the mirror (see [GRADIENTS]) hold for w only if they hold for the rigid motion. So spin and
    lambda are restricted to what the planes of a body allow: a roller plane turns about its normal, planes of two
    directions or a tangentially fixed one do not turn at all. Nothing is lost: about the other axes the planes exert
-   torques of their own. */
+   torques of their own.
+
+   Clamped bodies that wind up fast. Where a part rests while the body as a whole turns with W, damping of w pushes what is
+   out of line by z along W x z, as damping in the rotor makes a fast shaft whirl: layers come to alternate, which F hardly
+   sees. `projection` 0 ends that, for more dissipation (examples/twisting_limits.c). */
 
 typedef struct tlsphi_projection {
     tlsph_solver *s;
