@@ -571,7 +571,8 @@ typedef struct tlsph_fill {
     tlsph_length_fn distance;       /* TLSPH_DISTANCE: right near the surface; min joins bodies, max cuts, - turns inside out */
     void *distance_user;
     tlsph_surface surface;          /* TLSPH_TRIANGLES */
-    tlsph_length_fn spacing_at;     /* TLSPH_SCATTERED: local spacing, smooth, 1 : 4 at most; NULL: `spacing` */
+    tlsph_length_fn spacing_at;     /* TLSPH_SCATTERED: local spacing, smooth, 1 : 4 at most; 3-D: steeper than
+                                       0.1 m/m needs support 0.9; NULL: `spacing` */
     void *spacing_user;
     tlsph_allocator allocator;
 } tlsph_fill;

@@ -131,6 +131,33 @@ TEST(surfaces_are_checked)
             corners[9 * f + 6 + k] = tetrahedron[9 * f + 3 + k];
         }
     CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error), TLSPH_ERROR_SURFACE);
+    for (int i = 0; i < 3; i++) { /* no number; too large for a volume; far more facets than memory can hold */
+        memcpy(corners, tetrahedron, sizeof corners);
+        for (int c = 0; c < 36 && i < 2; c++)
+            if (tetrahedron[c] > 0) corners[c] = i ? R(HUGE_VAL) : R(NAN);
+        surface.count = i == 2 ? 2000000000u : 4;
+        CHECK(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error) != TLSPH_OK);
+        CHECK(error.message[0] != 0);
+    }
+}
+/* Two bodies in one surface, apart or through each other: the second has no meaning. */
+TEST(surfaces_through_each_other)
+{
+    for (int i = 0; i < 2; i++) {
+        const double shift = i ? 0.2 : 2;
+        const tlsph_real X[6] = { R(0.2), R(0.2), R(0.2), R(0.2 + shift), R(0.2), R(0.2) };
+        tlsph_real corners[72], V[2], B[6], spacings[2] = { R(0.7), R(0.7) };
+        tlsph_particles particles;
+        const tlsph_surface surface = { 8, corners };
+        memset(&particles, 0, sizeof particles);
+        particles.count = 2;
+        particles.positions = X;
+        particles.spacings = spacings; /* local ones do without a common one */
+        memcpy(corners, tetrahedron, sizeof tetrahedron);
+        for (int c = 0; c < 36; c++) corners[36 + c] = tetrahedron[c] + R(c % 3 ? 0 : shift);
+        CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL), i ? TLSPH_ERROR_SURFACE : TLSPH_OK);
+        if (!i) CHECK_CLOSE(V[0] + V[1], 1.0 / 3, 100 * EPSILON);
+    }
 }
 
 TEST(particles_outside_are_refused)
@@ -223,8 +250,15 @@ TEST(closed_refusals)
     CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_ERROR_NEIGHBOURS); /* an open surface */
     CHECK(strstr(error.message, "closed surface") != NULL);
     areas[0] = cloud.particles.areas[0];
-    positions[0] = -10;
+    for (size_t i = 0; i < 3 * n; i++) areas[i] = 0; /* no surface at all */
+    CHECK(tlsph_create(&desc, &solver, &error) != TLSPH_OK);
+    for (size_t i = 0; i < 3 * n; i++) areas[i] = cloud.particles.areas[i];
     desc.particles.positions = positions;
+    memcpy(positions + 3 * 40, positions + 3 * 41, 3 * sizeof *positions);
+    CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_ERROR_DUPLICATE);
+    CHECK(error.particle == 40 || error.particle == 41);
+    memcpy(positions + 3 * 40, cloud.particles.positions + 3 * 40, 3 * sizeof *positions);
+    positions[0] = -10;
     CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_ERROR_NEIGHBOURS);
     free(areas); free(positions);
     tlsph_cloud_destroy(&cloud);
@@ -293,6 +327,6 @@ TEST(swinging_cube_jittered)
     REPORT("p %.2e %.2e, P %.2e %.2e", p[0], p[1], P[0], P[1]);
 }
 
-SUITE(closure, ENTRY(cells_fill_the_body), ENTRY(cells_of_a_lattice), ENTRY(surfaces_are_checked),
+SUITE(closure, ENTRY(cells_fill_the_body), ENTRY(cells_of_a_lattice), ENTRY(surfaces_are_checked), ENTRY(surfaces_through_each_other),
       ENTRY(particles_outside_are_refused), ENTRY(closed_antisymmetric_exact), ENTRY(closed_refusals),
       ENTRY(closed_same_bits_for_any_threads), ENTRY(swinging_cube_jittered))

@@ -342,6 +342,41 @@ TEST(a_surface_finer_than_the_particles)
     free(corners);
 }
 
+/* Linearised: J is tr F - 2, and follows an F that the host writes. */
+TEST(jacobian_of_the_linear_material)
+{
+    small s;
+    tlsph_solver *solver;
+    tlsph_real *F, *J;
+    REQUIRE(small_make(&s, 3));
+    s.material.kind = TLSPH_LINEAR;
+    s.desc.unknowns = TLSPH_PFJ;
+    REQUIRE_OK(tlsph_create(&s.desc, &solver, NULL));
+    REQUIRE((F = read_field(solver, TLSPH_FIELD_F)) != NULL);
+    for (size_t i = 0; i < 9 * s.cloud.particles.count; i++) F[i] += R(0.01 * (double)(i % 9));
+    CHECK_RESULT(tlsph_write(solver, TLSPH_FIELD_F, F), TLSPH_OK);
+    REQUIRE((J = read_field(solver, TLSPH_FIELD_J)) != NULL);
+    for (size_t a = 0; a < s.cloud.particles.count; a++) CHECK_CLOSE(J[a], 1.12, 10 * EPSILON);
+    free(F);
+    free(J);
+    tlsph_destroy(solver);
+    own_cloud_destroy(&s.cloud);
+}
+/* The printed forces of plain corrected kernels sum over the kernel's own gradient: they keep the linear momentum. */
+TEST(printed_forces_keep_the_momentum)
+{
+    small s;
+    tlsph_ledger first, last;
+    REQUIRE(small_make(&s, 3));
+    s.desc.force_form = TLSPH_FORCE_AS_PRINTED;
+    s.desc.support = R(0.9);
+    s.desc.projection = 0;
+    moved(&s, 2, &first, &last);
+    for (int i = 0; i < 3; i++) CHECK_CLOSE(last.linear_momentum[i], first.linear_momentum[i], 100 * EPSILON * last.mass * 2);
+    CHECK(fabs(last.kinetic_energy - first.kinetic_energy) > 1e-6 * first.kinetic_energy);
+    own_cloud_destroy(&s.cloud);
+}
+
 /* ---- mirrors of the operator of order 4 ---- */
 
 static uint64_t operator_hash(small *s)
@@ -436,4 +471,5 @@ SUITE(edges, ENTRY(calls_without_arguments), ENTRY(constants_outside_their_lists
       ENTRY(options_without_an_object_change_nothing), ENTRY(entropy_without_the_heat_of_dissipation),
       ENTRY(cells_bring_their_volumes),
       ENTRY(materials_keep_to_their_particles), ENTRY(heat_through_whole_area_vectors),
-      ENTRY(a_surface_finer_than_the_particles), ENTRY(which_conditions_mirror), ENTRY(layers_of_two_sizes))
+      ENTRY(a_surface_finer_than_the_particles), ENTRY(jacobian_of_the_linear_material),
+      ENTRY(printed_forces_keep_the_momentum), ENTRY(which_conditions_mirror), ENTRY(layers_of_two_sizes))

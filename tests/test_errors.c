@@ -141,7 +141,7 @@ TEST(duplicate_positions)
 }
 
 /* A flat grid in 3-D, a line in 2-D: many neighbours, but no gradient across. */
-static void check_flat(int dimension)
+static void check_flat(int dimension, tlsph_operator_kind kind)
 {
     static const int cells[3] = {7, 7, 0};
     spoilt s;
@@ -160,6 +160,8 @@ static void check_flat(int dimension)
     s.desc.particles = flat.particles;
     s.desc.particles.spacing = R(0.25);
     s.desc.support = R(1.2);
+    s.desc.operator_kind = kind;
+    s.desc.particles.areas = flat.positions; /* TLSPH_CLOSED wants some */
     CHECK_RESULT(tlsph_create(&s.desc, &solver, &error), TLSPH_ERROR_NEIGHBOURS);
     CHECK(solver == NULL);
     CHECK(error.particle < flat.particles.count && says(&error, error.particle));
@@ -171,8 +173,12 @@ TEST(neighbours_missing_or_flat)
     tlsph_error error;
     REFUSED((s.desc.support = R(0.9), s.cloud.positions[3 * VICTIM] = 100), TLSPH_ERROR_NEIGHBOURS, VICTIM);
     CHECK_SAME(error.neighbours, 0);
-    check_flat(3);
-    check_flat(2);
+    static const tlsph_operator_kind kinds[] = {TLSPH_CORRECTED_KERNEL, TLSPH_ZEROTH_KERNEL, TLSPH_FIRST_KERNEL,
+                                                TLSPH_ZEROTH_BOND,      TLSPH_BOND,          TLSPH_CLOSED};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        check_flat(3, kinds[i]);
+        check_flat(2, kinds[i]);
+    }
 }
 
 /* ---- materials ---- */

@@ -229,6 +229,12 @@ TEST(forged_checkpoints_are_undone)
             memcpy(saved + places[i], kept, bytes);
         }
     }
+    saved[8] = 12 - (unsigned char)sizeof(tlsph_real); /* one of the other precision */
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t k = 0; k < size - 8; k++) hash = (hash ^ saved[k]) * 0x100000001b3u;
+    for (int k = 0; k < 8; k++) saved[size - 8 + (size_t)k] = (unsigned char)(hash >> (8 * k) & 255);
+    CHECK_RESULT(tlsph_restore(solver, saved, size), TLSPH_ERROR_CHECKPOINT);
+    CHECK(strcmp(tlsph_last_error(solver)->field, "fingerprint") == 0 && state_hash(solver) == before);
     CHECK_RESULT(take_steps(solver, 3), TLSPH_OK);
     free(saved);
     tlsph_destroy(solver);

@@ -31,6 +31,10 @@ static tlsph_real finer_to_the_left(void *user, const tlsph_real X[3])
     return *(const tlsph_real *)user * (1 + R(1.5) * (X[0] + 1)); /* 1 : 4 from X = -1 to 1 */
 }
 
+static tlsph_real slowly_finer(void *user, const tlsph_real X[3])
+{
+    return *(const tlsph_real *)user * (1 + R(0.5) * (X[0] + 1)); /* 1 : 2; support 0.825 closes no 1 : 4 in 3-D */
+}
 static tlsph_fill scattered(int dimension, tlsph_length_fn distance, double spacing)
 {
     tlsph_fill fill = tlsph_fill_default(dimension);
@@ -151,6 +155,11 @@ TEST(varying_spacing)
     fill.spacing_at = finer_to_the_left;
     fill.spacing_user = &least;
     check_cloud(&fill, 2.52 - SCENE_PI * 0.16, 6.4 + 0.8 * SCENE_PI, 0.01);
+    least = R(0.15);
+    fill = scattered(3, NULL, 0.15);
+    fill.spacing_at = slowly_finer;
+    fill.spacing_user = &least;
+    check_cloud(&fill, 8, 24, 1000 * EPSILON);
 }
 
 TEST(the_seed_decides)
