@@ -3488,7 +3488,7 @@ struct tlsph_solver {
     tlsphi_rows rows;
     tlsph_real *row;         /* blocks of rows, see above */
     tlsph_real *v, *grad_v;  /* velocity; grad v, which is rate_F but for sharp gradients */
-    int lanes;               /* fluxes by lanes: default dissipation, no audit */
+    int lanes;               /* fluxes by lanes, see [FLUXES] */
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
     tlsph_real *laplacian, *lean;     /* [JST]: l_ab a pair, 2 vectors a particle */
@@ -4603,8 +4603,8 @@ static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
    One gather over the neighbours: stress, numerical dissipation and heat. The power of the stresses needs no pairs: the
    flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
    is conserved to round-off because force and gradient are adjoint. The physics of a pair is written once, for two sides
-   that were loaded from the rows, and stands in two loops: over the lanes of a tile (the default dissipation), and over the
-   pairs of a particle (all else; with `audit` also the default, which is how tests compare the two). */
+   that were loaded from the rows, and stands in two loops: over the lanes of a tile, and over the pairs of a particle
+   (printed and JST dissipation, bonds, metals; with `audit` all, which is how tests compare the two). */
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
 typedef struct tlsphi_gathered {
@@ -4915,8 +4915,8 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
 }
 /* Writes the dissipation of a slot to `out` (T, J, production); returns whether a lane might be a front. */
 TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
-                                    const tlsph_real *pattern, const int dim, const int with_J, const int with_front,
-                                    tlsph_real jump_share, tlsphi_lane_sums *out) {
+                                    const tlsph_real *pattern, const int dim, const int with_J, const int kind,
+                                    const int with_front, tlsph_real jump_share, tlsphi_lane_sums *out) {
     tlsph_real approaches[TLSPHI_LANES_MOST], any = 0;
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_damp_side side_a, side_b;
@@ -4926,7 +4926,7 @@ TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, c
         tlsphi_load_side(r, b + l, dim, with_J, &side_b);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
         tlsphi_pair_dissipate(&side_a, &side_b, g, pattern[(size_t)dim * TLSPHI_LANES + l], dim, with_J, with_front,
-                              TLSPH_LIMITED, 0, jump_share, &flux);
+                              kind, 0, jump_share, &flux);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) out->T[(size_t)i * TLSPHI_LANES + l] = flux.D_p[i];
         out->J[l] = flux.D_J;
         out->production[l] = flux.production;
@@ -4948,6 +4948,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
     const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
     const tlsph_real *a = tlsphi_at(s, 0, base);
     const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
+    const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
@@ -4956,13 +4957,16 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         if (heats && s->conduction != TLSPH_COMPACT) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 0, 0, sum);
         else if (heats && s->M) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 1, sum);
         else if (heats) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 0, sum);
-        if (parts & TLSPHI_DAMPING) {
-            tlsphi_lane_sums flux;
-            if (tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 0, s->jump_share, &flux))
-                tlsphi_damp_lanes(&r, a, b, g, dim, with_J, 1, s->jump_share, &flux);
-            tlsphi_add_lanes(dim, &flux, sum);
-            for (size_t i = 0; s->leaps && i < (size_t)dim * TLSPHI_LANES; i++) sum->damped[i] += flux.T[i];
-        }
+        if (!damps) continue;
+        tlsphi_lane_sums flux;
+        if (s->dissipation == TLSPH_FIRST_ORDER)
+            tlsphi_damp_lanes(&r, a, b, g, dim, with_J, TLSPH_FIRST_ORDER, 0, s->jump_share, &flux);
+        else if (s->dissipation == TLSPH_RECONSTRUCTED)
+            tlsphi_damp_lanes(&r, a, b, g, dim, with_J, TLSPH_RECONSTRUCTED, 0, s->jump_share, &flux);
+        else if (tlsphi_damp_lanes(&r, a, b, g, dim, with_J, TLSPH_LIMITED, 0, s->jump_share, &flux))
+            tlsphi_damp_lanes(&r, a, b, g, dim, with_J, TLSPH_LIMITED, 1, s->jump_share, &flux);
+        tlsphi_add_lanes(dim, &flux, sum);
+        for (size_t i = 0; s->leaps && i < (size_t)dim * TLSPHI_LANES; i++) sum->damped[i] += flux.T[i];
     }
 }
 static void tlsphi_flux_slots_20(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
@@ -7767,7 +7771,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->rows.lap_p = s->rows.count;
         s->rows.count += s->dim;
     }
-    s->lanes = s->dissipation == TLSPH_LIMITED && !s->bonds && !s->audit && !s->metal;
+    s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;

@@ -86,7 +86,7 @@ static void visit(FILE *file, study_scene scene, int n, const char *configuratio
 static void visit_cross(FILE *file, study_scene scene, int n) {
     const int all = scene == STUDY_CUBE && n < study_scenes[scene].n[2]; /* elsewhere the dissipation is left limited */
     for (int o = 0; o < 5; o++)
-        for (int i = 0; i < 4; i++)
+        for (int i = 0; i < 5; i++)
             for (int d = 0; d < (all ? 3 : 1); d++)
                 for (int u = 0; u < 3; u++) {
                     char text[64];

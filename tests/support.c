@@ -209,6 +209,7 @@ static tlsph_desc moving_block_desc(const moving_block *s, const own_cloud *clou
     desc.unknowns = s->unknowns;
     desc.thermal = s->thermal;
     desc.integrator = s->integrator;
+    desc.dissipation = s->dissipation;
     desc.threads = s->threads;
     desc.audit = s->audit;
     desc.run = s->run;

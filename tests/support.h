@@ -53,6 +53,7 @@ typedef struct moving_block {
     tlsph_material_kind material;
     double jitter, mooney; /* share of the Mooney terms in mu */
     tlsph_integrator integrator;
+    tlsph_dissipation dissipation;
     int threads, audit;
     tlsph_run_fn run; void *run_user;
     tlsph_allocator allocator;
