@@ -2183,7 +2183,7 @@ static tlsph_result tlsphi_bond_correct(tlsphi_plan *plan, size_t a, const uint3
         const int row = k / dim, column = k % dim;
         double product = 0;
         for (int i = 0; i < dim; i++) product += c->L[3 * row + i] * moment[3 * i + column];
-        worst = tlsphi_dmax(worst, fabs(product - (row == column)));
+        worst = tlsphi_dmax(worst, tlsphi_finite((tlsph_real)product) ? fabs(product - (row == column)) : 1);
     }
     return worst <= 1e-6 ? TLSPH_OK
                          : tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "neighbours", a, (double)count, dim,
@@ -9485,7 +9485,8 @@ typedef struct tlsphi_sampler {
 static double tlsphi_local_spacing(const tlsph_fill *f, const double X[3]) {
     const tlsph_real at[3] = {(tlsph_real)X[0], (tlsph_real)X[1], (tlsph_real)X[2]};
     const double s = f->spacing_at ? (double)f->spacing_at(f->spacing_user, at) : (double)f->spacing;
-    return s > (double)f->spacing / 64 && s < 64 * (double)f->spacing ? s : (double)f->spacing;
+    const int plausible = tlsphi_finite((tlsph_real)s) && s > (double)f->spacing / 64 && s < 64 * (double)f->spacing;
+    return plausible ? s : (double)f->spacing;
 }
 static void tlsphi_sample_cell(const tlsphi_sampler *s, const double X[3], size_t at[3]) {
     for (int k = 0; k < 3; k++)
