@@ -2415,7 +2415,8 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent, uint32_t *
 
 #define TLSPHI_CLOSURE_SLACK 1e-3  /* eps */
 #define TLSPHI_CLOSURE_AREA 0.01   /* slack of B_a along n */
-#define TLSPHI_CLOSURE_LIMIT 1e-2  /* largest residual of the first solution, in the local spacing's area and 2 V */
+#define TLSPHI_CLOSURE_LIMIT 2e-2  /* largest residual of the first solution, in the local spacing's area and 2 V: a tenth
+                                      of it changes no error by 1 % */
 #define TLSPHI_CLOSURE_DEFECT 0.05 /* of linear fields in any particle, above which the second solution is made */
 #define TLSPHI_CLOSURE_TIGHT 1e-3  /* the same with `tight_closure` */
 #define TLSPHI_CLOSURE_BALANCE 1e-9 /* largest residual of sum C + B in the end */
@@ -2725,6 +2726,9 @@ static tlsph_result tlsphi_closure_parts(tlsphi_closer *c, uint32_t *parent, dou
         if (!(open <= 1e-4 * s[4]))
             return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "sum of the areas of its connected part over their size",
                                     a, open / s[4], 1e-4, "0: a closed surface; or raise `support` if the part is cut off");
+        if (s[3] > 0 && fabs(s[3] - s[5]) > 0.25 * c->unit * s[4])
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_SURFACE, "distance of the surface from its particles in spacings", a,
+                                    fabs(s[3] - s[5]) / (c->unit * s[4]), 0.25, "0: particles on the surface, not behind it");
         if (!(fabs(s[3] / s[5] - 1) < 0.3))
             return tlsphi_plan_fail(plan, TLSPH_ERROR_VOLUME, "sum of B.X over D V of its connected part", a, s[3] / s[5],
                                     1, "about 1: areas outward, of the same body as the volumes");

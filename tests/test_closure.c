@@ -217,13 +217,31 @@ TEST(closed_antisymmetric_exact)
             tlsph_closure_read(solver, &report);
             tlsph_operator_view(solver, &view);
             check_operator(&view, report.linear);
-            CHECK(report.iterations > 0 && report.residual <= 1e-2 && report.change_mean > 0);
+            CHECK(report.iterations > 0 && report.residual <= 2e-2 && report.change_mean > 0);
             tlsph_destroy(solver);
             tlsph_cloud_destroy(&cloud);
         }
 }
 
 /* Points without their surface, areas turned inward, and a splinter beyond everybody's reach. */
+TEST(closed_refuses_centred_cells)
+{
+    const tlsph_material material = closed_material();
+    for (int dimension = 2; dimension <= 3; dimension++)
+        for (int cells = 4; cells <= 16; cells *= 2) {
+            tlsph_fill fill = cloud_fill(dimension, TLSPH_BOX, cells, 0.2);
+            tlsph_cloud cloud;
+            tlsph_solver *solver;
+            tlsph_error error;
+            fill.placement = TLSPH_CELL_CENTRED;
+            REQUIRE_OK(tlsph_cloud_create(&fill, &cloud, NULL));
+            const tlsph_desc desc = closed_desc(dimension, &cloud.particles, &material);
+            CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_ERROR_SURFACE);
+            CHECK(strstr(error.message, "particles on the surface") != NULL);
+            tlsph_cloud_destroy(&cloud);
+        }
+}
+
 TEST(closed_refusals)
 {
     const tlsph_material material = closed_material();
@@ -327,6 +345,7 @@ TEST(swinging_cube_jittered)
     REPORT("p %.2e %.2e, P %.2e %.2e", p[0], p[1], P[0], P[1]);
 }
 
-SUITE(closure, ENTRY(cells_fill_the_body), ENTRY(cells_of_a_lattice), ENTRY(surfaces_are_checked), ENTRY(surfaces_through_each_other),
-      ENTRY(particles_outside_are_refused), ENTRY(closed_antisymmetric_exact), ENTRY(closed_refusals),
-      ENTRY(closed_same_bits_for_any_threads), ENTRY(swinging_cube_jittered))
+SUITE(closure, ENTRY(cells_fill_the_body), ENTRY(cells_of_a_lattice), ENTRY(surfaces_are_checked),
+      ENTRY(surfaces_through_each_other), ENTRY(particles_outside_are_refused), ENTRY(closed_antisymmetric_exact),
+      ENTRY(closed_refuses_centred_cells), ENTRY(closed_refusals), ENTRY(closed_same_bits_for_any_threads),
+      ENTRY(swinging_cube_jittered))

@@ -30,7 +30,7 @@ TEST(large_strain_balances)
     for (int k = 0; k < 4; k++) {
         scene_body body;
         tlsph_ledger start, end;
-        if (!lively_cloud(unknowns[k % 2], thermal[k / 2], 4, lively_state, &body)) return;
+        if (!lively_cloud(unknowns[k % 2], thermal[k / 2], 5, lively_state, &body)) return;
         tlsph_ledger_read(body.solver, &start);
         for (int i = 0; i < 300; i++) {
             if (!CHECK_RESULT(tlsph_step(body.solver, R(1e9)), TLSPH_OK)) { REPORT("%s", tlsph_last_error(body.solver)->message); return; }
