@@ -3478,8 +3478,8 @@ struct tlsph_solver {
     tlsph_real *X, *V, *B, *tau;
     uint32_t *host, *inner;
     /* state, and the state at the beginning of the step */
-    tlsphi_state now, old;
-    tlsph_real *now_memory, *old_memory;
+    tlsphi_state now, old, spare; /* spare: see tlsphi_share_state */
+    tlsph_real *now_memory, *old_memory, *spare_memory;
     /* incompressible scheme */
     int incompressible;
     tlsph_incompressible choice;
@@ -6286,29 +6286,31 @@ static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double d
    sum over the body is -sum (w.T_D + Sigma_J D_J) as before, so that the energy is conserved to round-off. Given up: within
    a step w may turn against T_D, so that a share, and the production of a pair, may be negative by O(dt) of itself. */
 
-/* dH/dt = F x grad v, before F itself changes. */
-TLSPHI_INLINE void tlsphi_update_cofactor(tlsph_solver *s, size_t a, const int dim, tlsph_real B, tlsph_real C) {
+/* dH/dt = F x grad v with F of state u. */
+TLSPHI_INLINE void tlsphi_update_cofactor(tlsph_solver *s, const tlsphi_state *u, size_t a, const int dim, tlsph_real B,
+                                          tlsph_real C) {
     const size_t dd = (size_t)(dim * dim);
     tlsph_real F[9], G[9], rate[9], in_plane[9], *now = s->now.H + dd * a;
-    const tlsph_real *old = s->old.H + dd * a;
-    tlsphi_expand(dim, s->now.F + dd * a, 1, F);
+    const tlsph_real *old = s->old.H + dd * a, *H = u->H + dd * a;
+    tlsphi_expand(dim, u->F + dd * a, 1, F);
     tlsphi_expand(dim, s->rate_F + dd * a, 0, G);
     tlsphi_cross_inline(F, G, rate);
     tlsphi_shrink(dim, rate, in_plane);
-    TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) now[i] = old[i] + B * (now[i] - old[i]) + C * in_plane[i];
+    TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) now[i] = old[i] + B * (H[i] - old[i]) + C * in_plane[i];
 }
 /* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
 static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
     const size_t D = (size_t)s->dim;
     s->rate_E[a] += tlsphi_dot(s->dim, s->v + D * a, s->rate_p + D * a);
 }
-/* u = a old + b u + c dt rate over the entries [begin, end), written so that a + b = 1 has no round-off. */
-static void tlsphi_combine(tlsph_real *u, const tlsph_real *old, const tlsph_real *rate, size_t begin, size_t end,
-                           tlsph_real B, tlsph_real C) {
-    for (size_t i = begin; i < end; i++) u[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
+/* now = a old + b u + c dt rate over the entries [begin, end), written so that a + b = 1 has no round-off. */
+static void tlsphi_combine(tlsph_real *now, const tlsph_real *old, const tlsph_real *u, const tlsph_real *rate,
+                           size_t begin, size_t end, tlsph_real B, tlsph_real C) {
+    for (size_t i = begin; i < end; i++) now[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
 }
 typedef struct tlsphi_update {
     tlsph_solver *s;
+    const tlsphi_state *u; /* the state before the stage */
     tlsph_real B, C;
 } tlsphi_update;
 
@@ -6317,21 +6319,27 @@ static void tlsphi_update_task(void *arg, size_t i) {
     tlsph_solver *s = up->s;
     const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real B = up->B, C = up->C;
+    const tlsphi_state *u = up->u;
     for (size_t a = begin; s->has_H && a < end; a++) {
-        if (s->dim == 3) tlsphi_update_cofactor(s, a, 3, B, C);
-        else tlsphi_update_cofactor(s, a, 2, B, C);
+        if (s->dim == 3) tlsphi_update_cofactor(s, u, a, 3, B, C);
+        else tlsphi_update_cofactor(s, u, a, 2, B, C);
     }
     for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
-    tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, B, C);
-    tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, B, C);
-    tlsphi_combine(s->now.F, s->old.F, s->rate_F, dd * begin, dd * end, B, C);
-    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, B, C);
-    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, B, C);
+    tlsphi_combine(s->now.x, s->old.x, u->x, s->v, D * begin, D * end, B, C);
+    tlsphi_combine(s->now.p, s->old.p, u->p, s->rate_p, D * begin, D * end, B, C);
+    tlsphi_combine(s->now.F, s->old.F, u->F, s->rate_F, dd * begin, dd * end, B, C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, u->J, s->rate_J, begin, end, B, C);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, u->E, s->rate_E, begin, end, B, C);
 }
-/* Algorithm 1 line (6). */
+/* Algorithm 1 line (6). In the first stage the state before is the old one, and the new one goes to the spare memory. */
 static void tlsphi_evolve(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
     tlsphi_update up;
     up.s = s;
+    up.u = s->now_memory == s->old_memory ? &s->old : &s->now;
+    if (up.u == &s->old) {
+        s->now = s->spare;
+        s->now_memory = s->spare_memory;
+    }
     up.B = (tlsph_real)stage->b;
     up.C = (tlsph_real)(stage->c * dt);
     tlsphi_run_tasks(s, tlsphi_update_task, &up);
@@ -6445,6 +6453,15 @@ static void tlsphi_keep_state(tlsph_solver *s) {
     memcpy(s->old_memory, s->now_memory, s->state_reals * sizeof *s->now_memory);
     s->account_old = s->account;
 }
+/* The same without a copy, which takes a twentieth of a step: until the first stage has ended (tlsphi_evolve), the old state
+   and the present one are the same memory. For schemes whose first stage writes all of the state. */
+static void tlsphi_share_state(tlsph_solver *s) {
+    s->spare = s->old;
+    s->spare_memory = s->old_memory;
+    s->old = s->now;
+    s->old_memory = s->now_memory;
+    s->account_old = s->account;
+}
 static void tlsphi_restore_state(tlsph_solver *s) {
     memcpy(s->now_memory, s->old_memory, s->state_reals * sizeof *s->now_memory);
     s->account = s->account_old;
@@ -6510,21 +6527,21 @@ static void tlsphi_drift_task(void *arg, size_t i) {
     const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
     for (size_t a = begin; s->has_H && a < end; a++) {
-        if (s->dim == 3) tlsphi_update_cofactor(s, a, 3, 0, C);
-        else tlsphi_update_cofactor(s, a, 2, 0, C);
+        if (s->dim == 3) tlsphi_update_cofactor(s, &s->now, a, 3, 0, C);
+        else tlsphi_update_cofactor(s, &s->now, a, 2, 0, C);
     }
-    tlsphi_combine(s->now.x, s->old.x, s->v, D * begin, D * end, 0, C);
-    tlsphi_combine(s->now.F, s->old.F, s->rate_F, dd * begin, dd * end, 0, C);
-    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, on, C);
-    if (s->thermal == TLSPH_ENERGY) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, on, C);
+    tlsphi_combine(s->now.x, s->old.x, s->now.x, s->v, D * begin, D * end, 0, C);
+    tlsphi_combine(s->now.F, s->old.F, s->now.F, s->rate_F, dd * begin, dd * end, 0, C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, on, C);
+    if (s->thermal == TLSPH_ENERGY) tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, on, C);
 }
 static void tlsphi_kick_task(void *arg, size_t i) {
     const tlsphi_leap_move *kick = (const tlsphi_leap_move *)arg;
     tlsph_solver *s = kick->s;
     const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
-    tlsphi_combine(s->now.p, s->old.p, s->rate_p, D * begin, D * end, 0, kick->C);
-    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->rate_J, begin, end, 0, kick->C);
-    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->rate_E, begin, end, 0, kick->C);
+    tlsphi_combine(s->now.p, s->old.p, s->now.p, s->rate_p, D * begin, D * end, 0, kick->C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, 0, kick->C);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, 0, kick->C);
 }
 /* v becomes m. */
 static void tlsphi_mean_velocity_block(tlsph_solver *s, tlsphi_block *block) {
@@ -6662,7 +6679,8 @@ static size_t tlsphi_shrunk(const tlsph_solver *s, double *share) {
 static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     const tlsphi_scheme *scheme = tlsphi_schemes + s->integrator;
     const int split = s->super.most && dt > tlsphi_heat_step(s);
-    tlsphi_keep_state(s); /* (1) u_old, x_old                     */
+    if (split || s->leaps || s->incompressible || s->now.plastic) tlsphi_keep_state(s); /* (1) u_old, x_old */
+    else tlsphi_share_state(s);
     if (split) {
         const tlsphi_block *bad = tlsphi_conduct(s, s->time, dt / 2);
         memcpy(s->super.E, s->old.E, s->n * sizeof *s->old.E);
