@@ -35,16 +35,17 @@ toolchain() {
     if [ "$runner" = - ]; then runner= filters=
     else have "$runner" || { skip "$name" "no $runner"; return; }
     fi
+    case $compiler in *mingw*) exe=.exe ;; *) exe= ;; esac
     rm -rf "$work/$name"
     mkdir -p "$work/$name"
     echo 'int main(void) { return 0; }' > "$work/$name/probe.c"
-    if ! $compiler $flags "$work/$name/probe.c" -o "$work/$name/probe" 2> "$work/$name/log" || ! $runner "$work/$name/probe" \
+    if ! $compiler $flags "$work/$name/probe.c" -o "$work/$name/probe$exe" 2> "$work/$name/log" || ! $runner "$work/$name/probe$exe" \
         > /dev/null 2>&1; then
         skip "$name" "$compiler $flags makes no program that runs"
         return
     fi
-    if compile "$name" "$compiler" "$flags" && $compiler $flags "$work/$name"/*.o -lm -lpthread -o "$work/$name/tests" \
-        >> "$work/$name/log" 2>&1 && $runner "$work/$name/tests" $filters > "$work/$name/out" 2>&1; then
+    if compile "$name" "$compiler" "$flags" && $compiler $flags "$work/$name"/*.o -lm -lpthread -o "$work/$name/tests$exe" \
+        >> "$work/$name/log" 2>&1 && $runner "$work/$name/tests$exe" $filters > "$work/$name/out" 2>&1; then
         echo "ok    $name: $(tail -n 1 "$work/$name/out" | tr -d '\r')$(grep -q 'warning:' "$work/$name/log" && echo ", warnings")"
         passed=$((passed + 1))
     else
