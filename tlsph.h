@@ -6533,7 +6533,8 @@ static void tlsphi_drift_task(void *arg, size_t i) {
     tlsphi_combine(s->now.x, s->old.x, s->now.x, s->v, D * begin, D * end, 0, C);
     tlsphi_combine(s->now.F, s->old.F, s->now.F, s->rate_F, dd * begin, dd * end, 0, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, on, C);
-    if (s->thermal == TLSPH_ENERGY) tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, on, C);
+    if (s->thermal == TLSPH_ENERGY || (s->thermal && drift->on))
+        tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, on, C);
 }
 static void tlsphi_kick_task(void *arg, size_t i) {
     const tlsphi_leap_move *kick = (const tlsphi_leap_move *)arg;
