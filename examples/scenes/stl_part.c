@@ -9,6 +9,7 @@ void stl_part_default(stl_part_parameters *p) {
     memset(p, 0, sizeof *p);
     scene_options_default(&p->options);
     p->options.integrator = TLSPH_RK3_FROZEN;
+    p->options.threads = 1; /* a small scene runs best on one */
     p->options.end_time = 0.015;
     p->spacing = 0.006;
     p->seed = 1;
