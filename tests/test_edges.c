@@ -307,13 +307,15 @@ static void facet(tlsph_real *corner, size_t *at, const double a[3], const doubl
 TEST(a_surface_finer_than_the_particles)
 {
     enum { LEVEL = 5, FACETS = 8 << (2 * LEVEL) };
-    tlsph_real *corners = malloc(9 * FACETS * sizeof *corners), X[3 * 33], V[33], B[3 * 33];
-    tlsph_surface surface = {FACETS, corners};
+    tlsph_real *corners, X[3 * 33], V[33], B[3 * 33];
+    tlsph_surface surface = {FACETS, NULL};
     tlsph_particles p;
     size_t at = 0;
     double total = 0, open[3] = {0};
     tlsph_error error;
     DOUBLE_ONLY();
+    corners = malloc(9 * FACETS * sizeof *corners);
+    surface.corners = corners;
     REQUIRE(corners);
     memset(&p, 0, sizeof p);
     for (int i = 0; i < 8; i++) {
