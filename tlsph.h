@@ -60,8 +60,8 @@ PROMISES
 
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
-  [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [GRADIENTS] [JST] [FLUXES]
-  [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEAPFROG] [ALGORITHM] [LEDGER]
+  [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [SURFACES] [GRADIENTS] [JST]
+  [FLUXES] [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEAPFROG] [ALGORITHM] [LEDGER]
   [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [TILES] [SELF-TEST] [PREFLIGHT] [VORONOI] [SHAPES] [FILL]
   [REPRODUCING] [LICENCE]
 */
@@ -290,7 +290,10 @@ typedef struct tlsph_material_report {
     int inverted;         /* samples left out because det F was not positive */
 } tlsph_material_report;
 
-/* Boundary conditions, loads and contact. Angle brackets: what `value` means. */
+/* Boundary conditions, loads and contact. Angle brackets: what `value` means. Where particles lie behind the surface
+   (`moments`), conditions on surfaces hold at the middle of the particle's share of it, X_a + o: `values` gets its place, loads
+   act there, and velocities and temperatures are prescribed there, not to the particle ([SURFACES]). Particles without a
+   share, and forces on volumes, are treated as ever. */
 typedef enum tlsph_condition_kind {
     TLSPH_CLAMPED,       /* v = 0 */
     TLSPH_ROLLER,        /* v.N = 0: a symmetry plane; fields are mirrored across it (gradients know) */
@@ -319,6 +322,8 @@ typedef struct tlsph_condition {
     size_t count;
     tlsph_real value[3];
     tlsph_real normal[3];        /* reference normal N of the plane, need not be of unit length */
+    tlsph_real face[3];          /* particles behind the surface: normal of the part of it that is meant, see [SURFACES];
+                                    zero: `normal`, and where that is zero all of the particle's share */
     tlsph_real point[3];         /* TLSPH_WALL */
     const tlsph_real *areas;     /* traction, heat flux: m^2 a particle; pressure: 3 a particle, outward. Copied.
                                     NULL: the operator's boundary area vector, projected on `normal` where it is given */
@@ -334,6 +339,8 @@ typedef struct tlsph_particles {
     const tlsph_real *volumes;    /* V_a, tributary volume, m^3 (2-D: m^2), > 0: mass, force balance, loads */
     const tlsph_real *weights;    /* w_a, kernel weight (full cell volume also at faces); NULL: volumes */
     const tlsph_real *areas;      /* TLSPH_CLOSED: B_a, 3 each, m^2 (2-D: m), outward, zero inside (see tlsph_voronoi) */
+    const tlsph_real *moments;    /* TLSPH_CLOSED, particles behind the surface: T_a = integral of n (x) (x - X_a) over the
+                                     particle's share of it, 9 each, m^3 (2-D: m^2); NULL: particles on the surface */
     const tlsph_real *spacings;   /* local spacing of each particle, m, where it varies; NULL: `spacing` everywhere */
     const uint8_t *materials;     /* index into the description's materials; NULL: all 0 */
     tlsph_real spacing;           /* smoothing length h = support x spacing; 0: (mean weight)^(1/dimension) */
@@ -539,8 +546,9 @@ typedef enum tlsph_shape {
 typedef enum tlsph_placement {
     TLSPH_ON_FACES,     /* particles at cell corners, on the faces of the body, with tributary volumes; default */
     TLSPH_CELL_CENTRED, /* particles at cell centres, equal volumes */
-    TLSPH_SCATTERED     /* an irregular cloud with Voronoi volumes and areas, particles on corners, edges and faces and
+    TLSPH_SCATTERED,    /* an irregular cloud with Voronoi volumes and areas, particles on corners, edges and faces and
                            inside (see [SHAPES]); not TLSPH_PREDICATE. For TLSPH_CLOSED */
+    TLSPH_SCATTERED_INSIDE /* the same with all particles inside, some half a spacing behind the surface, and moments */
 } tlsph_placement;
 typedef int (*tlsph_inside_fn)(void *user, const tlsph_real X[3]);
 /* A length (m) at X: distance from a body's surface, negative inside; or a spacing. */
@@ -565,7 +573,8 @@ typedef struct tlsph_fill {
     tlsph_placement placement;
     tlsph_real jitter;              /* inner particles move by up to jitter x spacing along each axis; 0 to 0.45 */
     uint64_t seed;                  /* of the jitter */
-    int voronoi;                    /* 1: volumes and area vectors from Voronoi cells, for TLSPH_CLOSED; default 0 */
+    int voronoi;                    /* 1: volumes and area vectors from Voronoi cells, for TLSPH_CLOSED; with TLSPH_CELL_CENTRED
+                                       moments, too; default 0 */
     tlsph_inside_fn inside;         /* TLSPH_PREDICATE */
     void *inside_user;
     tlsph_length_fn distance;       /* TLSPH_DISTANCE: right near the surface; min joins bodies, max cuts, - turns inside out */
@@ -684,15 +693,16 @@ TLSPH_API tlsph_fill tlsph_fill_default(int dimension);
    *cloud is empty. */
 TLSPH_API tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *cloud, tlsph_error *error);
 TLSPH_API void tlsph_cloud_destroy(tlsph_cloud *cloud);
-/* Voronoi cells of the particles, cut by the body's surface: V_a (1 each) and B_a (3 each) for TLSPH_CLOSED. Volumes add up
-   to the body's and have its centroid, area vectors add up to zero. Reads count, positions, spacing (or spacings) of
+/* Voronoi cells of the particles, cut by the body's surface: V_a (1 each), B_a (3 each) and, if not NULL, moments T_a (9
+   each) for TLSPH_CLOSED. Volumes add up to the body's and have its centroid, area vectors add up to zero, B_a (x) X_a + T_a
+   to the volume times I. Reads count, positions, spacing (or spacings) of
    `particles`, which must lie in the body or on its surface. allocator NULL: the default one. ERROR_SURFACE names the
    place; ERROR_VOLUME a particle outside. */
 TLSPH_API tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *particles, const tlsph_surface *surface,
                                      const tlsph_allocator *allocator, tlsph_real *volumes, tlsph_real *areas,
-                                     tlsph_error *error);
-/* Numbers of all particles with |X[axis] - value| <= tolerance (m). Writes at most `capacity`, returns how many there
-   are. */
+                                     tlsph_real *moments, tlsph_error *error);
+/* Numbers of all particles with |X[axis] - value| <= tolerance (m); of those with moments, X is the middle of their share of
+   the surface across that axis, inner ones do not count. Writes at most `capacity`, returns how many there are. */
 TLSPH_API size_t tlsph_select_plane(const tlsph_particles *particles, int axis, tlsph_real value, tlsph_real tolerance,
                                     uint32_t *out, size_t capacity);
 /* The same for inside(user, X) != 0. */
@@ -1382,6 +1392,7 @@ static void tlsphi_grid_hash(tlsphi_grid *grid) {
    of pairs, and whether C is antisymmetric by itself. Each builder answers one question: which neighbours has host
    particle a, and what is g_ab for each? */
 
+#define TLSPHI_CORRECTION_MOST 10 /* largest entry of M_a behind surfaces */
 #define TLSPHI_BLOCK 128 /* particles a task: small enough for load balance, large enough to hide the call */
 
 /* Lanes. The hot loops take this many neighbouring particles at once: the physics of one pair or particle is written for
@@ -1440,7 +1451,7 @@ typedef struct tlsphi_plan {
     tlsphi_graph graph[2];   /* of all pairs; of those of the dissipation, where they are others. See [TILES] */
     uint8_t *fixed;          /* number of constrained directions of each particle (solver order), */
     double *fixed_direction; /* and these directions, orthonormal, dim x dim each */
-    size_t fixes, mirrors;   /* how many in all (see [CONDITIONS]) */
+    size_t fixes, mirrors, held_parts; /* how many in all (see [CONDITIONS], [SURFACES]) */
     tlsphi_scratch scratch[64];
     int scratches;
 } tlsphi_plan;
@@ -2235,6 +2246,29 @@ static void tlsphi_join(uint32_t *parent, uint32_t a, uint32_t b) {
     else parent[a] = b;
 }
 
+static void tlsphi_closed_moment(const tlsphi_plan *plan, size_t a, double A[9]); /* [CLOSURE] */
+
+/* M_a = V (V I - T)^-1 for particles behind the surface; A: the operator's own V I - T. */
+static int tlsphi_owns_surface(const tlsph_desc *d, size_t a); /* [VALIDATION] */
+static tlsph_result tlsphi_correct_closed(tlsphi_plan *plan, size_t a, const double A[9]) {
+    const double V = tlsphi_plan_volume(plan, a);
+    const size_t dd = (size_t)(plan->dim * plan->dim);
+    double wanted[9], *M = plan->correction + dd * a, worst = 0, most = 0;
+    tlsphi_closed_moment(plan, a, wanted);
+    for (int k = 0; k < 9; k++) worst = tlsphi_dmax(worst, fabs(A[k] - wanted[k]) / V);
+    tlsphi_inverse(plan->dim, wanted, M);
+    for (size_t k = 0; k < dd; k++) {
+        M[k] *= V;
+        most = tlsphi_dmax(most, fabs(M[k]));
+    }
+    if (!(worst <= 0.1))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_NEIGHBOURS, "defect of sum C (x) d / 2 = V I - T over V", a, worst, 0.1,
+                                "pair vectors that are exact for linear fields");
+    if (!(most <= TLSPHI_CORRECTION_MOST))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_SURFACE, "its distance from the surface: V (V I - T)^-1", a, most,
+                                TLSPHI_CORRECTION_MOST, "about 2 half a spacing behind it; more particles across thin parts");
+    return TLSPH_OK;
+}
 /* Goes once over all particles: builds M_a, joins bodies. list and g hold the largest neighbourhood. */
 static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t *list, double *g) {
     for (size_t a = 0; a < plan->n; a++) {
@@ -2245,7 +2279,9 @@ static tlsph_result tlsphi_survey(tlsphi_plan *plan, uint32_t *parent, uint32_t 
         if (!r && plan->bond) r = tlsphi_bond_correct(plan, a, list, count);
         if (r) return r;
         const double V = tlsphi_plan_volume(plan, a);
-        if (plan->correction) {
+        if (plan->closed_C && plan->correction) {
+            if ((r = tlsphi_correct_closed(plan, a, A))) return r;
+        } else if (plan->correction) {
             r = tlsphi_correct(plan, a, A, count, plan->correction + (size_t)(plan->dim * plan->dim) * a);
             if (r) return r;
         } else if (!plan->bond) {
@@ -2410,6 +2446,11 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent, uint32_t *
    `tight_closure` with a hundredth, which leaves 0.1 % and costs ten times as much, and waves are not the better for it.
    What the iterations leave of sum C + B is at last taken away by l alone, a graph's Laplacian, after sum B (x) X was made
    V I: a uniform stress exerts no force inside the body but round-off, and its tractions no torque.
+
+   Particles behind the surface (`moments`). The share of the surface that a particle owns lies around X_a + o, not at X_a. With
+   T_a = integral of n (x) (x - X_a) over it, B (x) o where it is flat, the second condition becomes V I - T, by the divergence
+   theorem on the particle's cell. Gradients of linear fields come out right by M_a = V (V I - T)^-1 ([OPERATORS]), and
+   with P M in the forces a uniform stress is in balance with the tractions P B at the shares' own places ([SURFACES]).
    Conjugate gradients; preconditioner: the inverse of each particle's own (1 + D) x (1 + D) block, one for all components.
    In units of the largest spacing. w and d are rounded to float: that halves the memory to read and costs d 1e-7. */
 
@@ -2435,6 +2476,8 @@ typedef struct tlsphi_closer {
     float (*block)[16];           /* inverse blocks */
     double (*slack)[7];           /* n times the root of B's slack; slack of m; scales of residuals: h^(D-1), 2 V; across n */
     double *sums;                 /* 2 a task */
+    uint32_t *part;               /* number of the connected part with each root, and the parts' turns */
+    struct tlsphi_closure_turn *turn;
     double step, beta, eased, unit; /* eased: share of the slack; unit: m */
 } tlsphi_closer;
 
@@ -2560,7 +2603,7 @@ static void tlsphi_closure_invert(size_t n, double *A) {
         }
     }
 }
-/* A uniform stress has no torque on a part where sum B (x) X = V I. What is missing for that goes into the lengths of its B,
+/* A uniform stress has no torque on a part where sum B (x) X + T = V I. What is missing for that goes into the lengths of its B,
    V n (n.(y_0 + Y X)): D (D + 1) equations A y = R a part. */
 typedef struct tlsphi_closure_turn { double A[144], y[12]; } tlsphi_closure_turn;
 /* y = A^-1 y; A may lack directions, for instance the turns of a ball. */
@@ -2577,50 +2620,75 @@ static void tlsphi_closure_turn_solve(tlsphi_closure_turn *t, size_t N) {
         for (size_t m = 0; m < N; m++) t->y[k] += t->A[N * k + m] * y[m];
     }
 }
+/* V I less the moment by which tractions act: T, or behind the surface T M K/V = (M - I) K, since loads are levered by the
+   particles' own gradients (see [SURFACES]); K = sum C (x) d / 2 of the solution, as it is in q. */
+static void tlsphi_closure_arms(const tlsphi_closer *c, size_t i, double A[9]) {
+    const size_t D = c->rows - 1, a = c->plan->grid.order[i];
+    const double V = tlsphi_plan_volume(c->plan, a), volume = pow(c->unit, (double)D);
+    double M[9] = {0};
+    tlsphi_closed_moment(c->plan, a, A);
+    if (!tlsphi_owns_surface(c->plan->desc, a)) return;
+    tlsphi_inverse((int)D, A, M);
+    for (size_t j = 0; j < D; j++)
+        for (size_t l = 0; l < D; l++) {
+            A[3 * j + l] = j == l ? V : 0;
+            for (size_t k = 0; k < D; k++) {
+                const size_t at = 4 * c->rows * i + 4 * (l + 1) + k;
+                A[3 * j + l] -= (V * M[D * j + k] - (j == k)) * (c->q[at] - c->slack[i][3] * c->x[at]) * volume / 2;
+            }
+        }
+}
 /* Adds grid particle i to the equations of its part, around X0; or (apply) their solution to the residual. */
 static void tlsphi_closure_turn_add(tlsphi_closer *c, size_t i, const tlsph_real *X0, tlsphi_closure_turn *t, int apply) {
     const size_t rows = c->rows, N = (rows - 1) * rows;
     const tlsph_real *X = c->plan->desc->particles.positions + 3 * c->plan->grid.order[i];
     const double *n = c->slack[i], volume = c->slack[i][5] / 2, nn = tlsphi_dot3(n, n);
-    double f[4] = {1, 0, 0, 0}, had[3] = {0, 0, 0}, along = 0;
+    double f[4] = {1, 0, 0, 0}, had[3] = {0, 0, 0}, along = 0, A[9];
+    const double unit = pow(c->unit, (double)(rows - 1));
     for (size_t k = 1; k < rows; k++) f[k] = (double)(X[k - 1] - X0[k - 1]) / c->unit;
     if (apply && nn > 0) {
         for (size_t k = 0; k < N; k++) along += n[k / rows] * t->y[k] * f[k % rows];
         for (size_t k = 0; k < 3; k++) c->r[4 * i + k] -= volume * along / nn * n[k];
     }
     if (apply) return;
+    tlsphi_closure_arms(c, i, A);
     tlsphi_closure_slack(c->slack[i], c->x + 4 * rows * i, had);
     for (size_t k = 0; k < N; k++) {
         const size_t j = k / rows;
         t->y[k] += (c->r[4 * i + j] + c->q[4 * rows * i + j] - had[j]) * f[k % rows];
-        if (k % rows == j + 1) t->y[k] += volume;
+        if (k % rows) t->y[k] += A[3 * j + k % rows - 1] / unit;
         for (size_t m = 0; nn > 0 && m < N; m++)
             t->A[N * k + m] += volume / nn * n[j] * n[m / rows] * f[k % rows] * f[m % rows];
     }
 }
-static tlsph_result tlsphi_closure_turn_all(tlsphi_closer *c, uint32_t *parent) {
+static tlsph_result tlsphi_closure_turn_all(tlsphi_closer *c, uint32_t *parent, double *missing) {
     const tlsph_real *X = c->plan->desc->particles.positions;
     const size_t N = (c->rows - 1) * c->rows;
-    uint32_t *part = TLSPHI_SCRATCH(c->plan, uint32_t, c->n), parts = 0;
-    for (size_t a = 0; part && a < c->n; a++)
-        if (parent[a] == a) part[a] = parts++;
-    tlsphi_closure_turn *turn = TLSPHI_SCRATCH(c->plan, tlsphi_closure_turn, parts);
-    if (!part || !turn) return tlsphi_no_memory(c->plan, 1248.0 * parts + 4.0 * (double)c->n);
+    uint32_t parts = 0;
+    if (!c->part && !(c->part = TLSPHI_SCRATCH(c->plan, uint32_t, c->n))) return tlsphi_no_memory(c->plan, 4.0 * (double)c->n);
+    for (size_t a = 0; a < c->n; a++)
+        if (parent[a] == a) c->part[a] = parts++;
+    if (!c->turn && !(c->turn = TLSPHI_SCRATCH(c->plan, tlsphi_closure_turn, parts))) return tlsphi_no_memory(c->plan, 1248.0 * parts);
+    tlsphi_closure_turn *const turn = c->turn;
     memset(turn, 0, parts * sizeof *turn);
     for (int apply = 0; apply < 2; apply++) {
         for (size_t i = 0; i < c->n; i++) {
             const size_t root = tlsphi_root(parent, c->plan->grid.order[i]);
-            tlsphi_closure_turn_add(c, i, X + 3 * root, turn + part[root], apply);
+            tlsphi_closure_turn_add(c, i, X + 3 * root, turn + c->part[root], apply);
         }
-        for (uint32_t p = 0; !apply && p < parts; p++) tlsphi_closure_turn_solve(turn + p, N);
+        *missing = 0;
+        for (uint32_t p = 0; p < parts; p++) {
+            if (!apply) tlsphi_closure_turn_solve(turn + p, N);
+            for (size_t k = 0; k < N; k++) *missing = tlsphi_dmax(*missing, fabs(turn[p].y[k]));
+        }
     }
     return TLSPH_OK;
 }
-/* The last word: l alone, packed into the memory of p. */
-static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent) {
+/* The last word: l alone, packed into the memory of p. Behind the surface arms change with l, so that it is said again. */
+static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, int again) {
     tlsphi_closer packed = *c;
     const size_t size = 4 * c->n;
-    double residual;
+    double residual, missing;
     for (size_t i = 0; i < c->n; i++) {
         double sum = 0;
         for (size_t k = c->first[i]; k < c->first[i + 1]; k++) sum += (double)c->pair[k][0];
@@ -2628,9 +2696,9 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent) {
     }
     memcpy(c->p, c->x, c->rows * size * sizeof *c->p);
     tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
-    for (size_t i = 0; i < size; i++) c->r[i] = tlsphi_closure_open(c, i / 4, i % 4);
-    const tlsph_result turned = tlsphi_closure_turn_all(c, parent);
-    if (turned) return turned;
+    for (size_t i = 0; i < size; i++) c->r[i] = again ? 0 : tlsphi_closure_open(c, i / 4, i % 4);
+    const tlsph_result turned = tlsphi_closure_turn_all(c, parent, &missing);
+    if (turned || (again && !(missing > TLSPHI_CLOSURE_BALANCE))) return turned;
     packed.rows = 1;
     packed.x = c->p;
     packed.p = c->p + size;
@@ -2638,9 +2706,18 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent) {
     memset(packed.x, 0, size * sizeof *packed.x);
     const tlsph_result r = tlsphi_closure_iterate(&packed, TLSPHI_CLOSURE_BALANCE, &residual);
     for (size_t i = 0; i < size; i++) c->x[c->rows * (i - i % 4) + i % 4] += packed.x[i];
-    return r;
+    return r || !c->plan->desc->particles.moments || again > 20 ? r : tlsphi_closure_balance(c, parent, again + 1);
 }
 
+/* V I - T of host particle a, padded to 3x3. */
+static void tlsphi_closed_moment(const tlsphi_plan *plan, size_t a, double A[9]) {
+    const tlsph_real *T = plan->desc->particles.moments;
+    for (int k = 0; k < 9; k++) {
+        const int inside = k / 3 < plan->dim && k % 3 < plan->dim;
+        A[k] = k % 4 ? 0 : inside ? tlsphi_plan_volume(plan, a) : 1;
+        if (T && inside) A[k] -= (double)T[9 * a + (size_t)k];
+    }
+}
 /* Block and slack of grid particle i, and its start: m, row by row, into out. */
 static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double *out) {
     tlsphi_plan *plan = c->plan;
@@ -2648,7 +2725,7 @@ static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double *
     const tlsph_real *B = plan->desc->particles.areas + 3 * a;
     const double BB = (double)tlsphi_dot(plan->dim, B, B), volume = pow(c->unit, (double)D);
     const double h = tlsphi_pair_h(plan, a, a) / (double)plan->desc->support / c->unit;
-    double block[16] = {0}, moment[9] = {0}, m[9], *slack = c->slack[i];
+    double block[16] = {0}, moment[9] = {0}, m[9], A[9], *slack = c->slack[i];
     if (D == 2) moment[8] = 1;
     for (size_t k = c->first[i]; k < c->first[i + 1]; k++) {
         const float *pair = c->pair[k];
@@ -2659,13 +2736,16 @@ static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double *
     const tlsph_result r = tlsphi_correct(plan, a, moment, c->first[i + 1] - c->first[i], m);
     if (r) return r;
     for (size_t j = 0; j < 4 * rows; j++) out[j] = 0;
-    for (size_t j = 0; j < D * D; j++) out[4 * (1 + j % D) + j / D] = m[j] / volume;
+    tlsphi_closed_moment(plan, a, A);
+    for (size_t j = 0; j < D * D; j++) /* (V I - T) (sum w d (x) d)^-1; m is V times the inverse */
+        for (size_t k = 0; k < D; k++)
+            out[4 * (1 + j % D) + j / D] += A[3 * (j / D) + k] * m[D * k + j % D] / (volume * tlsphi_plan_volume(plan, a));
     slack[4] = D == 3 ? h * h : h;
     slack[5] = 2 * tlsphi_plan_volume(plan, a) / volume;
     const double sum = block[0], share = tlsphi_dmin(1, slack[5] / (2 * slack[4] * h));
     const double area = BB > 0 ? TLSPHI_CLOSURE_AREA * sum : 0;
     for (size_t j = 0; j < 3; j++) slack[j] = j < D && BB > 0 ? sqrt(area / BB) * (double)B[j] : 0;
-    slack[6] = c->first[i + 1] - c->first[i] <= D + 1 ? area : 0;
+    slack[6] = c->first[i + 1] - c->first[i] <= D + 1 && !plan->desc->particles.moments ? area : 0;
     slack[3] = TLSPHI_CLOSURE_SLACK * c->eased * share * share * sum * h * h;
     block[0] += area / (double)D;
     for (size_t j = 1; j < rows; j++) block[(rows + 1) * j] += slack[3];
@@ -2712,6 +2792,7 @@ static tlsph_result tlsphi_closure_parts(tlsphi_closer *c, uint32_t *parent, dou
             const double B = (double)p->areas[3 * a + (size_t)k];
             s[k] += B;
             s[3] += B * ((double)p->positions[3 * a + (size_t)k] - plan->grid.low[k]);
+            if (p->moments) s[3] += (double)p->moments[9 * a + 4 * (size_t)k];
             BB += B * B;
         }
         s[4] += sqrt(BB);
@@ -2728,7 +2809,8 @@ static tlsph_result tlsphi_closure_parts(tlsphi_closer *c, uint32_t *parent, dou
                                     a, open / s[4], 1e-4, "0: a closed surface; or raise `support` if the part is cut off");
         if (s[3] > 0 && fabs(s[3] - s[5]) > 0.25 * c->unit * s[4])
             return tlsphi_plan_fail(plan, TLSPH_ERROR_SURFACE, "distance of the surface from its particles in spacings", a,
-                                    fabs(s[3] - s[5]) / (c->unit * s[4]), 0.25, "0: particles on the surface, not behind it");
+                                    fabs(s[3] - s[5]) / (c->unit * s[4]), 0.25,
+                                    "0: particles on the surface, not behind it, or with `moments` (tlsph_voronoi)");
         if (!(fabs(s[3] / s[5] - 1) < 0.3))
             return tlsphi_plan_fail(plan, TLSPH_ERROR_VOLUME, "sum of B.X over D V of its connected part", a, s[3] / s[5],
                                     1, "about 1: areas outward, of the same body as the volumes");
@@ -2738,6 +2820,7 @@ static tlsph_result tlsphi_closure_parts(tlsphi_closer *c, uint32_t *parent, dou
 /* The start in x, and its residual. */
 static tlsph_result tlsphi_closure_start(tlsphi_closer *c) {
     const size_t D = (size_t)c->plan->dim, rows = c->rows;
+    const double volume = pow(c->unit, (double)D);
     for (size_t i = 0; i < c->n; i++) {
         const tlsph_result r = tlsphi_closure_particle(c, i, c->p + 4 * rows * i);
         if (r) return r;
@@ -2745,9 +2828,11 @@ static tlsph_result tlsphi_closure_start(tlsphi_closer *c) {
     tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
     for (size_t i = 0; i < c->n; i++) {
         const double *p = c->p + 4 * rows * i, *q = c->q + 4 * rows * i;
+        double A[9];
+        tlsphi_closed_moment(c->plan, c->plan->grid.order[i], A);
         for (size_t j = 0; j < 4 * rows; j++) /* slack holds for the change from the start */
             c->r[4 * rows * i + j] = j < 4 ? tlsphi_closure_open(c, i, j)
-                                           : (j % 5 == 4 && j / 5 < D ? c->slack[i][5] : 0) - q[j] + c->slack[i][3] * p[j];
+                                           : (j % 4 < D ? 2 * A[3 * (j % 4) + j / 4 - 1] / volume : 0) - q[j] + c->slack[i][3] * p[j];
     }
     memcpy(c->x, c->p, 4 * rows * c->n * sizeof *c->x);
     return TLSPH_OK;
@@ -2787,7 +2872,7 @@ static void tlsphi_closure_store(tlsphi_closer *c, size_t *first, uint32_t *list
     for (size_t a = 0; a < c->n; a++) first[a + 1] += first[a];
     for (size_t i = 0; i < c->n; i++) {
         const size_t a = plan->grid.order[i];
-        double sum[16] = {0};
+        double sum[16] = {0}, A[9];
         for (size_t k = c->first[i], at = first[a]; k < c->first[i + 1]; k++, at++) {
             const double *x[2] = {c->x + width * i, c->x + width * c->list[k]};
             const double *p[2] = {c->p + width * i, c->p + width * c->list[k]};
@@ -2811,11 +2896,13 @@ static void tlsphi_closure_store(tlsphi_closer *c, size_t *first, uint32_t *list
             report->change_mean += sqrt(change);
             report->change_largest = tlsphi_dmax(report->change_largest, sqrt(change));
         }
+        tlsphi_closed_moment(plan, a, A);
         for (size_t j = 0; j < D; j++) {
             const double B = (double)plan->desc->particles.areas[3 * a + j] / area;
             report->closing = tlsphi_dmax(report->closing, fabs(sum[j] + B) / c->slack[i][4]);
             for (size_t l = 0; l < D; l++)
-                report->linear = tlsphi_dmax(report->linear, fabs(sum[4 * (l + 1) + j] / c->slack[i][5] - (l == j)));
+                report->linear = tlsphi_dmax(report->linear, fabs(sum[4 * (l + 1) + j] / c->slack[i][5] -
+                                                                  A[3 * j + l] / tlsphi_plan_volume(plan, a)));
         }
     }
     report->change_largest *= (double)plan->pairs / start_sum;
@@ -2848,7 +2935,7 @@ static tlsph_result tlsphi_closure_solve(tlsphi_plan *plan, uint32_t *parent, ui
         return tlsphi_no_memory(plan, 640.0 * (double)n + 48.0 * (double)plan->pairs);
     if ((r = tlsphi_closure_lists(c, sorted, parent, list, g)) || (r = tlsphi_closure_parts(c, parent, c->p)) ||
         (r = tlsphi_closure_start(c)) || (r = tlsphi_closure_iterate(c, TLSPHI_CLOSURE_LIMIT, &plan->closure.residual)) ||
-        (r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_balance(c, parent)))
+        (r = tlsphi_closure_tighten(c)) || (r = tlsphi_closure_balance(c, parent, 0)))
         return r;
     tlsphi_closure_store(c, host_first, host_list, C);
     plan->closed_first = host_first;
@@ -3395,8 +3482,21 @@ typedef struct tlsphi_fix {
     tlsph_real e[3];
 } tlsphi_fix;
 
+/* Particles behind the surface: the part of a particle's share of it that a condition means; see [SURFACES]. */
+typedef struct tlsphi_part {
+    tlsph_real B[3], T[9], o[3]; /* area vector, moment, middle seen from X_a */
+} tlsphi_part;
+typedef struct tlsphi_held_part {
+    uint32_t particle, load, item; /* whose values are `wanted`; load TLSPHI_NONE: at rest */
+    int along;                     /* 0: all components are held, 1: that along N, -1: those across N */
+    tlsph_real N[3], W[9];         /* W = M^-1 */
+    tlsph_real wanted[3], jump[3]; /* v of the surface, and what the extrapolated v lacks of it */
+    tlsphi_part part;
+} tlsphi_held_part;
+
 typedef struct tlsphi_load {
     tlsph_condition given;  /* pointers replaced by copies */
+    tlsphi_part *part;      /* one a particle; NULL: particles on the surface, or a load on volumes */
     uint32_t *inner, *host; /* solver and host numbers */
     tlsph_real *area;       /* traction, heat flux: 1; pressure: D; else NULL */
     tlsph_real *values;     /* 3 or 1 a particle, of the current stage */
@@ -3461,7 +3561,7 @@ struct tlsph_solver {
     tlsph_volume_coupling coupling;
     tlsph_conduction conduction;
     tlsph_real drift_stiffness, drift_scale, jump_share, drift_relaxation, cfl, limit;
-    size_t n, pairs, blocks, bodies, fixes, mirrors, loads;
+    size_t n, pairs, blocks, bodies, fixes, mirrors, loads, held_parts;
     tlsphi_material *materials;
     size_t material_count;
     uint8_t *material_of; /* NULL: one material */
@@ -3502,6 +3602,7 @@ struct tlsph_solver {
     tlsphi_mirror *mirror;
     uint32_t *mirror_of;
     tlsphi_load *load;
+    tlsphi_held_part *held_part; /* sorted by particle */
     tlsphi_block *block;
     tlsphi_body *body;
     /* time and balances */
@@ -4182,6 +4283,138 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
     out->production = tlsphi_dot(3, Dv, out->D_p) + DS * out->D_J;
 }
 
+/* ==== [SURFACES] ===================================================================================================
+   Conditions where particles lie behind the surface. A particle owns a share of it, in parts of different normals, with area
+   vector B, moment T = integral of n (x) (X - X_a), middle X_a + o. There a field is
+
+     f_o = f_a + grad f_a o,   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) M_a g_ab,   so   f_o = f_a + sum_b y_b (f_b - f_a).
+
+   A load t on the part acts by the same weights, y_b t on b and the rest on a: its power is t.v_o and its torque about x_o
+   exactly, and in a uniform stress with t = P B the particle is in balance, because M_a = V (V I - T)^-1.
+   A prescribed velocity u enters the gradient, and by the adjoint of that the wall pulls with the stress of the particle:
+
+     grad v += S [(u - v_a) (x) B - grad v_a T^T] / V_a  (S (u - v_o) (x) B/V where it is flat),   force on the part S P_a B,
+
+   S: the components that are held. Its power is that of the wall, so E stays exact. Linear fields and uniform stress are
+   exact for any u and S, so parts of different conditions may meet in a particle. The wall damps, too, by half of the
+   impedance: D = rho |B|/2 (c_p nn + c_s (I - nn)) S (u - v_o), heat D.(u - v_o) >= 0.
+   A prescribed temperature fixes theta_a so that theta_o is the given one. */
+
+/* Of a force of first moment Z = force (x) arm about X_a: what the k-th neighbour of a takes. */
+TLSPHI_INLINE void tlsphi_lever(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *Z, tlsph_real *y) {
+    const size_t D = (size_t)s->dim;
+    tlsph_real C[3];
+    tlsphi_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
+    tlsphi_multiply(s->dim, Z, C, y);
+    for (size_t i = 0; i < D; i++) y[i] /= 2 * s->V[a];
+}
+/* y_b of the k-th neighbour for o = arm. */
+static tlsph_real tlsphi_share_behind(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *arm) {
+    const size_t D = (size_t)s->dim;
+    tlsph_real C[3] = {0, 0, 0};
+    tlsphi_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
+    return tlsphi_dot(s->dim, arm, C) / (2 * s->V[a]);
+}
+/* The first held part of a particle >= a. */
+static tlsphi_held_part *tlsphi_find_held_part(const tlsph_solver *s, size_t a) {
+    size_t low = 0, high = s->held_parts;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (s->held_part[middle].particle < a) low = middle + 1;
+        else high = middle;
+    }
+    return s->held_part + low;
+}
+/* S v */
+static void tlsphi_held_components(int dim, const tlsphi_held_part *h, tlsph_real *v) {
+    const tlsph_real along = tlsphi_dot(dim, v, h->N);
+    for (int i = 0; h->along && i < dim; i++) v[i] = h->along > 0 ? along * h->N[i] : v[i] - along * h->N[i];
+}
+/* P_a without M. */
+static void tlsphi_stress_behind(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *P) {
+    tlsph_real PM[9];
+    tlsphi_row_get(s, s->rows.PM, s->dim * s->dim, h->particle, PM);
+    tlsphi_product(s->dim, PM, h->W, P);
+}
+/* Adds the jumps at the held parts [h, end) of one particle to its gradients, and their power to E. */
+static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tlsphi_held_part *end) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim, dd = D * D, a = h->particle;
+    tlsph_real G[9], P[9], *grad = s->grad_v + dd * a;
+    memcpy(G, grad, dd * sizeof *G);
+    tlsphi_stress_behind(s, h, P);
+    for (; h != end; h++)
+        for (size_t j = 0; j <= D; j++) { /* column j of S [...], at last the jump at the middle itself */
+            const tlsph_real B = j < D ? h->part.B[j] : 1, *arm = j < D ? h->part.T + D * j : h->part.o;
+            tlsph_real column[3];
+            for (size_t i = 0; i < D; i++)
+                column[i] = (h->wanted[i] - s->v[D * a + i]) * B - tlsphi_dot(dim, G + D * i, arm);
+            tlsphi_held_components(dim, h, column);
+            for (size_t i = 0; i < D; i++) {
+                const tlsph_real change = column[i] / s->V[a];
+                if (j == D) h->jump[i] = column[i];
+                if (j == D) continue;
+                grad[D * i + j] += change;
+                tlsphi_at(s, s->rows.grad_w, a)[(D * i + j) * TLSPHI_ROW] += change;
+                if (s->rate_E) s->rate_E[a] += P[D * i + j] * change;
+            }
+        }
+}
+/* Force of a held part: S P B and the damping D, with its first moment Z; returns the heat D.jump, W. */
+static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *force, tlsph_real *Z) {
+    const int dim = s->dim;
+    const size_t D = (size_t)dim, a = h->particle;
+    tlsph_real P[9], A[9], H[9], c[3], damping[3], wave[3], column[3];
+    tlsphi_stress_behind(s, h, P);
+    tlsphi_row_get(s, s->rows.A, dim * dim, a, A);
+    tlsphi_row_get(s, s->rows.wave, 3, a, wave);
+    tlsphi_product(dim, A, h->W, H);
+    tlsphi_multiply(dim, H, h->part.B, c);
+    const tlsph_real half = wave[2] * tlsphi_sqrt(tlsphi_dot(dim, h->part.B, h->part.B)) / 2;
+    const tlsph_real normal = tlsphi_dot(dim, c, h->jump) * tlsphi_inverse_or_0(tlsphi_dot(dim, c, c));
+    for (size_t i = 0; i < D; i++)
+        damping[i] = s->dissipation == TLSPH_NO_DISSIPATION
+                         ? 0
+                         : half * (wave[1] * h->jump[i] + (wave[0] - wave[1]) * normal * c[i]);
+    tlsphi_held_components(dim, h, damping);
+    tlsphi_multiply(dim, P, h->part.B, force);
+    tlsphi_held_components(dim, h, force);
+    for (size_t j = 0; j < D; j++) {
+        tlsph_real arm[3] = {0, 0, 0};
+        for (size_t i = 0; i < D; i++) arm[i] = h->part.T[D * i + j];
+        tlsphi_multiply(dim, P, arm, column);
+        tlsphi_held_components(dim, h, column);
+        for (size_t i = 0; i < D; i++) Z[D * i + j] = column[i] + damping[i] * h->part.o[j];
+    }
+    for (size_t i = 0; i < D; i++) force[i] += damping[i];
+    return tlsphi_dot(dim, damping, h->jump);
+}
+/* Forces of all held parts, after the projection: the surroundings exert them. weight: dt times the stage's share. */
+static void tlsphi_held_forces(tlsph_solver *s, double weight) {
+    const size_t D = (size_t)s->dim;
+    for (const tlsphi_held_part *h = s->held_part, *end = h + s->held_parts; h != end; h++) {
+        const size_t a = h->particle;
+        tlsph_real force[3] = {0, 0, 0}, Z[9], y[3];
+        const tlsph_real heat = tlsphi_held_force(s, h, force, Z);
+        s->account.external_work += weight * (double)tlsphi_dot(s->dim, force, h->wanted);
+        s->account.dissipation += weight * (double)heat;
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+            const size_t b = s->neighbour[k];
+            tlsphi_lever(s, a, k, Z, y);
+            for (size_t i = 0; i < D; i++) {
+                s->rate_p[D * b + i] += y[i] / s->V[b];
+                force[i] -= y[i];
+            }
+        }
+        for (size_t i = 0; i < D; i++) s->rate_p[D * a + i] += force[i] / s->V[a];
+        if (!s->rate_E) continue;
+        const tlsph_real theta = *tlsphi_theta(s, a);
+        s->account.dissipation_entropy += weight * (double)(heat / theta);
+        if (s->thermal == TLSPH_ENERGY) s->rate_E[a] += heat / s->V[a];
+        else if (s->dissipation_heats) s->rate_E[a] += heat / (s->V[a] * theta);
+    }
+}
+
 /* ==== [GRADIENTS] ==================================================================================================
    grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) g_ab M_a^T (000-53), for v and, where needed, Sigma_J and theta. */
 
@@ -4464,14 +4697,18 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
         if (s->dim == 3) tlsphi_gradient_tile(s, block, tile, a, end, 3, with_w, with_S, with_theta);
         else tlsphi_gradient_tile(s, block, tile, a, end, 2, with_w, with_S, with_theta);
     }
-    if (!s->rest && !s->mirrors && !s->images && !with_theta && !s->turns) return;
+    if (!s->rest && !s->mirrors && !s->images && !s->held_parts && !with_theta && !s->turns) return;
+    tlsphi_held_part *held = tlsphi_find_held_part(s, block->begin), *const parts = s->held_part + s->held_parts;
     for (size_t a = block->begin; a < block->end; a++) {
         const int mirrored = tlsphi_mirrors_of(s, a) != NULL, imaged = image != last && image->particle == a;
         if (s->rest) tlsphi_gradient_rest(s, a);
         for (; image != last && image->particle == a; image++) tlsphi_image_gradient(s, image);
+        tlsphi_held_part *const from = held;
+        while (held != parts && held->particle == a) held++;
+        if (held != from) tlsphi_hold_gradient(s, from, held);
         if (mirrored) tlsphi_mirror_gradients(s, a);
         if (s->turns) tlsphi_turn_gradient(s, s->body[block->body].spin, a);
-        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || s->turns)) tlsphi_jacobian_rate(s, a);
+        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || held != from || s->turns)) tlsphi_jacobian_rate(s, a);
         if (with_theta) tlsphi_heat_flux(s, a);
     }
 }
@@ -5159,8 +5396,12 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
     if (!load->given.values) return;
     for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < 3; k++) {
-            load->X[3 * i + k] = k < D ? s->X[D * load->inner[i] + k] : 0;
-            load->x[3 * i + k] = k < D ? s->now.x[D * load->inner[i] + k] : 0;
+            const size_t at = D * load->inner[i] + k;
+            load->X[3 * i + k] = k < D ? s->X[at] : 0;
+            load->x[3 * i + k] = k < D ? s->now.x[at] : 0;
+            if (!load->part || k >= D) continue;
+            load->X[3 * i + k] += load->part[i].o[k];
+            load->x[3 * i + k] += tlsphi_dot(s->dim, s->now.F + D * at, load->part[i].o);
         }
     load->given.values(load->given.values_user, (tlsph_real)time, count, load->host, load->X, load->x, load->values);
 }
@@ -5191,8 +5432,20 @@ static void tlsphi_stage_arm(const tlsph_solver *s, const tlsphi_stage *stage, d
                                dt * (stage->z_was * (double)s->old.p[at] / rho + stage->z_is * (double)s->v[at]);
 }
 
-/* The force of a load on its i-th particle, N. */
-static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real force[3]) {
+/* Surface velocities of held parts at a time. */
+static void tlsphi_surface_velocities(tlsph_solver *s, double time) {
+    for (size_t i = 0; s->held_parts && i < s->loads; i++)
+        if (s->load[i].given.kind == TLSPH_VELOCITY) tlsphi_load_values(s, s->load + i, time);
+    for (tlsphi_held_part *h = s->held_part, *end = h + s->held_parts; h != end; h++)
+        if (h->load != TLSPHI_NONE) memcpy(h->wanted, s->load[h->load].values + 3 * (size_t)h->item, sizeof h->wanted);
+}
+/* Is the i-th particle of a drive held at its surface, not itself? */
+static int tlsphi_driven_behind(const tlsphi_load *load, size_t i) {
+    return load->part && tlsphi_dot(3, load->part[i].B, load->part[i].B) > 0;
+}
+
+/* The force of a load on its i-th particle, N; behind the surface also its first moment Z. */
+static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real force[3], tlsph_real Z[9]) {
     const size_t a = load->inner[i], D = (size_t)s->dim;
     const tlsph_real *value = load->values + 3 * i;
     tlsph_real factor = 1;
@@ -5203,32 +5456,44 @@ static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, si
         tlsphi_shrink(s->dim, pt.H, H);
         tlsphi_multiply(s->dim, H, load->area + D * i, force);
         for (size_t k = 0; k < D; k++) force[k] *= -load->values[i];
+        if (load->part) tlsphi_product(s->dim, H, load->part[i].T, Z);
+        for (size_t k = 0; load->part && k < D * D; k++) Z[k] *= -load->values[i];
         return;
     }
     if (load->given.kind == TLSPH_TRACTION) factor = load->area[i];
     if (load->given.kind == TLSPH_BODY_FORCE) factor = s->V[a];
     if (load->given.kind == TLSPH_ACCELERATION) factor = s->V[a] * tlsphi_material_of(s, a)->rho;
     for (size_t k = 0; k < D; k++) force[k] = factor * value[k];
+    for (size_t k = 0; load->part && k < D * D; k++) Z[k] = force[k / D] * load->part[i].o[k % D];
 }
 
-static void tlsphi_apply_force(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
+/* A force on particle a, N. */
+static void tlsphi_push_particle(tlsph_solver *s, size_t a, const tlsph_real force[3], const tlsphi_stage *stage, double dt) {
     const size_t D = (size_t)s->dim;
     const double share = stage->rate_weight * dt;
     tlsphi_account *account = &s->account;
+    double z[3];
+    tlsphi_stage_arm(s, stage, dt, a, z);
+    const tlsph_real power = tlsphi_dot(s->dim, force, s->v + D * a);
+    for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += force[k] / s->V[a];
+    account->external_work += share * (double)power;
+    for (int k = 0; k < 3; k++) {
+        const int l = (k + 1) % 3, m = (k + 2) % 3;
+        account->impulse[k] += share * (double)force[k];
+        account->angular_impulse[k] += dt * (z[l] * (double)force[m] - z[m] * (double)force[l]);
+    }
+}
+static void tlsphi_apply_force(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        tlsph_real force[3] = {0, 0, 0};
-        double z[3];
-        tlsphi_load_force(s, load, i, force);
-        tlsphi_stage_arm(s, stage, dt, a, z);
-        const tlsph_real power = tlsphi_dot(s->dim, force, s->v + D * a);
-        for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += force[k] / s->V[a];
-        account->external_work += share * (double)power;
-        for (int k = 0; k < 3; k++) {
-            const int l = (k + 1) % 3, m = (k + 2) % 3;
-            account->impulse[k] += share * (double)force[k];
-            account->angular_impulse[k] += dt * (z[l] * (double)force[m] - z[m] * (double)force[l]);
+        tlsph_real force[3] = {0, 0, 0}, Z[9], y[3] = {0, 0, 0};
+        tlsphi_load_force(s, load, i, force, Z);
+        for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
+            tlsphi_lever(s, a, k, Z, y);
+            tlsphi_push_particle(s, s->neighbour[k], y, stage, dt);
+            for (int j = 0; j < s->dim; j++) force[j] -= y[j];
         }
+        tlsphi_push_particle(s, a, force, stage, dt);
     }
 }
 
@@ -5237,14 +5502,23 @@ static tlsph_real tlsphi_heat_power(const tlsph_solver *s, const tlsphi_load *lo
     return load->given.kind == TLSPH_HEAT_FLUX ? -load->values[i] * load->area[i]
                                                : load->values[i] * s->V[load->inner[i]];
 }
+static void tlsphi_heat(tlsph_solver *s, size_t a, tlsph_real power, double weight) {
+    const tlsph_real theta = *tlsphi_theta(s, a);
+    s->rate_E[a] += power / s->V[a] / (s->thermal == TLSPH_ENTROPY ? theta : 1);
+    s->account.external_heat += weight * (double)power;
+    s->account.external_entropy += weight * (double)(power / theta);
+}
 static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        const tlsph_real theta = (*tlsphi_theta(s, a));
-        const tlsph_real power = tlsphi_heat_power(s, load, i);
-        s->rate_E[a] += power / s->V[a] / (s->thermal == TLSPH_ENTROPY ? theta : 1);
-        s->account.external_heat += stage->rate_weight * dt * (double)power;
-        s->account.external_entropy += stage->rate_weight * dt * (double)(power / theta);
+        tlsph_real power = tlsphi_heat_power(s, load, i), arm[3] = {0, 0, 0};
+        for (int k = 0; load->part && k < s->dim; k++) arm[k] = power * load->part[i].o[k];
+        for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
+            const tlsph_real y = tlsphi_share_behind(s, a, k, arm);
+            tlsphi_heat(s, s->neighbour[k], y, stage->rate_weight * dt);
+            power -= y;
+        }
+        tlsphi_heat(s, a, power, stage->rate_weight * dt);
     }
 }
 
@@ -5259,6 +5533,7 @@ static void tlsphi_release_driven_power(tlsph_solver *s, tlsphi_load *load, cons
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
         tlsph_real part[3];
+        if (tlsphi_driven_behind(load, i)) continue;
         tlsphi_driven_part(s->dim, &load->given, s->v + D * a, part);
         const tlsph_real power = tlsphi_dot(s->dim, part, s->rate_p + D * a);
         load->before[i] = tlsphi_dot(s->dim, part, part) * tlsphi_material_of(s, a)->rho / 2;
@@ -5289,6 +5564,7 @@ static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage 
         const size_t a = load->inner[i];
         const tlsph_real rho = tlsphi_material_of(s, a)->rho;
         tlsph_real is[3], was[3], wanted[3], *p = s->now.p + D * a;
+        if (tlsphi_driven_behind(load, i)) continue;
         tlsphi_driven_part(s->dim, &load->given, p, is);
         tlsphi_driven_part(s->dim, &load->given, s->old.p + D * a, was);
         tlsphi_driven_part(s->dim, &load->given, load->values + 3 * i, wanted);
@@ -5342,11 +5618,23 @@ static int tlsphi_set_temperature(tlsph_solver *s, size_t a, tlsph_real theta) {
     else s->now.E[a] = pt.r.entropy + m->c_v * tlsphi_log(theta / m->theta_R) - pt.plastic.entropy;
     return 1;
 }
+/* The temperature of the i-th particle with which that of its surface is the given one, half of that at least: the neighbours
+   are those before the stage. */
+static tlsph_real tlsphi_temperature_behind(const tlsph_solver *s, const tlsphi_load *load, size_t i) {
+    const size_t a = load->inner[i];
+    tlsph_real value = load->values[i], own = 1;
+    for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
+        const tlsph_real y = tlsphi_share_behind(s, a, k, load->part[i].o);
+        value -= y * *tlsphi_theta(s, s->neighbour[k]);
+        own -= y;
+    }
+    return tlsphi_max(value / own, load->values[i] / 2);
+}
 static void tlsphi_hold_temperature(tlsph_solver *s, tlsphi_load *load, double weight, double time) {
     tlsphi_load_values(s, load, time);
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        const tlsph_real theta = load->values[i], before = s->now.E[a];
+        const tlsph_real theta = load->part ? tlsphi_temperature_behind(s, load, i) : load->values[i], before = s->now.E[a];
         if (!tlsphi_set_temperature(s, a, theta)) continue; /* the evaluation that follows reports it */
         const double gain = weight * (double)((s->now.E[a] - before) * s->V[a]);
         s->account.external_heat += s->thermal == TLSPH_ENTROPY ? gain * (double)theta : gain;
@@ -5698,6 +5986,7 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
     projection.stage = *stage;
     projection.dt = dt;
     if (s->projection) tlsphi_find_rigid_motion(&projection);
+    tlsphi_surface_velocities(s, s->time + stage->start * dt);
     tlsphi_run(s, tlsphi_gradient_block);
     if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block);
     if (s->laplacian && s->damps) tlsphi_run(s, tlsphi_laplacian_block);
@@ -5705,6 +5994,7 @@ static void tlsphi_right_hand_side(tlsph_solver *s, const tlsphi_stage *stage, d
     tlsphi_collect_sums(s, stage->rate_weight * dt);
     if (s->projection) tlsphi_project(&projection);
     tlsphi_image_forces(s);
+    tlsphi_held_forces(s, stage->rate_weight * dt);
     tlsphi_apply_loads(s, stage, dt);
 }
 
@@ -6588,7 +6878,7 @@ static void tlsphi_mean_work_of_loads(tlsph_solver *s, double dt) {
             if (kind == TLSPH_VELOCITY) {
                 tlsphi_driven_part(s->dim, &load->given, rate, force);
                 for (size_t l = 0; l < D; l++) force[l] *= -s->V[a];
-            } else tlsphi_load_force(s, load, k, force);
+            } else tlsphi_load_force(s, load, k, force, NULL); /* not behind surfaces */
             s->account.external_work += dt * (double)tlsphi_dot(s->dim, force, change);
         }
     }
@@ -7236,6 +7526,10 @@ static tlsph_result tlsphi_check_range(tlsphi_plan *plan, const char *field, dou
                ? TLSPH_OK
                : tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, field, TLSPH_NO_PARTICLE, value, low, allowed);
 }
+/* Are particles behind their surface? */
+static int tlsphi_has_moments(const tlsph_desc *d) {
+    return d->operator_kind == TLSPH_CLOSED && d->particles.moments;
+}
 static int tlsphi_is_cells(const tlsph_desc *d) {
     return d->operator_kind == TLSPH_CELLS || d->operator_kind == TLSPH_CELLS_4;
 }
@@ -7281,6 +7575,12 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"incompressible.pseudo_modulus", (double)d->incompressible.pseudo_modulus, 1e-3, 1e9, "0.001 to 1e9"},
         {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
         {"threads", (double)d->threads, 0, 4096, "0 to 4096"},
+        {"integrator", (double)d->integrator, 0, tlsphi_has_moments(d) ? TLSPH_RK4_FROZEN : TLSPH_LEAPFROG,
+         "a Runge-Kutta scheme where particles have moments"},
+        {"conduction_stages", (double)d->conduction_stages, 0, tlsphi_has_moments(d) ? 0 : 1000,
+         "0 where particles have moments"},
+        {"scheme", (double)d->scheme, 0, tlsphi_has_moments(d) ? TLSPH_EXPLICIT : TLSPH_INCOMPRESSIBLE,
+         "TLSPH_EXPLICIT where particles have moments"},
         {"particles.spacing", (double)d->particles.spacing, 0, TLSPHI_LARGEST, "0 (from the weights) or more"},
         {"material_count", (double)d->material_count, 1, 256, "1 to 256"},
         {"particles.count", (double)d->particles.count, 2, 4294967294.0, "2 to 2^32 - 2"},
@@ -7336,6 +7636,8 @@ static tlsph_result tlsphi_check_particles(tlsphi_plan *plan) {
         }
         if (p->areas && !tlsphi_all_finite(p->areas + 3 * a, (size_t)d->dimension))
             return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "area", a, (double)p->areas[3 * a], 0, "finite");
+        if (p->moments && !tlsphi_all_finite(p->moments + 9 * a, 9))
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_NOT_FINITE, "moment", a, (double)p->moments[9 * a], 0, "finite");
         if (p->materials && p->materials[a] >= d->material_count)
             return tlsphi_plan_fail(plan, TLSPH_ERROR_MATERIAL, "material index", a, p->materials[a],
                                     (double)d->material_count, "less than material_count");
@@ -7360,6 +7662,22 @@ static uint32_t tlsphi_set_host(const tlsph_condition *c, size_t i) {
     return c->particles ? c->particles[i] : (uint32_t)i;
 }
 
+static int tlsphi_is_constraint(tlsph_condition_kind kind) {
+    return kind == TLSPH_CLAMPED || kind == TLSPH_ROLLER || kind == TLSPH_TANGENT;
+}
+static int tlsphi_holds_velocity(tlsph_condition_kind kind) {
+    return tlsphi_is_constraint(kind) || kind == TLSPH_VELOCITY;
+}
+/* Does host particle a lie behind its surface? */
+static int tlsphi_owns_surface(const tlsph_desc *d, size_t a) {
+    return tlsphi_has_moments(d) && tlsphi_dot(d->dimension, d->particles.areas + 3 * a, d->particles.areas + 3 * a) > 0;
+}
+/* The normal that picks a part of a particle's share of the surface; NULL: all of it. */
+static const tlsph_real *tlsphi_condition_face(int dim, const tlsph_condition *c) {
+    return tlsphi_dot(dim, c->face, c->face) > 0     ? c->face
+           : tlsphi_dot(dim, c->normal, c->normal) > 0 ? c->normal
+                                                       : NULL;
+}
 static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condition *c) {
     const size_t n = plan->n;
     const int plane = c->kind == TLSPH_ROLLER || c->kind == TLSPH_TANGENT || c->kind == TLSPH_WALL;
@@ -7370,15 +7688,16 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
     if (!c->particles && c->count)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particles", TLSPH_NO_PARTICLE, (double)c->count, 0,
                                 "not NULL, or count 0 for all");
-    if (!tlsphi_all_finite(c->normal, 3) || !tlsphi_all_finite(c->value, 3) || !tlsphi_all_finite(c->point, 3))
-        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "value, normal or point", TLSPH_NO_PARTICLE, 0, 0,
+    if (!tlsphi_all_finite(c->normal, 3) || !tlsphi_all_finite(c->value, 3) || !tlsphi_all_finite(c->point, 3) ||
+        !tlsphi_all_finite(c->face, 3))
+        return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "value, normal, face or point", TLSPH_NO_PARTICLE, 0, 0,
                                 "finite");
     if ((plane && !(NN > 0)) || !tlsphi_finite(NN))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "normal", TLSPH_NO_PARTICLE, (double)NN, 0,
                                 "a square that is finite, and not zero for this kind");
-    if (c->kind == TLSPH_WALL && plan->desc->scheme == TLSPH_INCOMPRESSIBLE)
+    if (c->kind == TLSPH_WALL && (plan->desc->scheme == TLSPH_INCOMPRESSIBLE || tlsphi_has_moments(plan->desc)))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
-                                "no walls with TLSPH_INCOMPRESSIBLE");
+                                "no walls with TLSPH_INCOMPRESSIBLE, nor where particles have moments");
     if (tlsphi_is_thermal(c->kind) && !plan->desc->thermal)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
                                 "no heat in an isothermal scene");
@@ -7389,6 +7708,16 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
         if (c->particles[i] >= n)
             return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "particle number", c->particles[i],
                                     (double)c->particles[i], (double)n, "less than the number of particles");
+    for (size_t i = 0; tlsphi_holds_velocity(c->kind) && i < tlsphi_set_size(plan, c); i++) {
+        const uint32_t a = tlsphi_set_host(c, i);
+        if (!tlsphi_owns_surface(plan->desc, a)) continue;
+        const tlsph_real *B = plan->desc->particles.areas + 3 * a, *N = tlsphi_condition_face(plan->dim, c);
+        const tlsph_real share = N ? tlsphi_abs(tlsphi_dot(plan->dim, B, N)) / tlsphi_sqrt(tlsphi_dot(plan->dim, N, N)) : 1;
+        plan->held_parts++;
+        if (!(share > TLSPHI_R(1e-6) * tlsphi_sqrt(tlsphi_dot(plan->dim, B, B))))
+            return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "share of the surface across face or normal", a,
+                                    (double)share, 0, "more than 0: particles next to it (tlsph_select_plane)");
+    }
     const size_t per = c->kind == TLSPH_PRESSURE ? 3 : 1;
     for (size_t i = 0; c->areas && i < per * tlsphi_set_size(plan, c); i++)
         if (!tlsphi_finite(c->areas[i]))
@@ -7398,10 +7727,6 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
 }
 
 /* ==== [CREATION] =================================================================================================== */
-
-static int tlsphi_is_constraint(tlsph_condition_kind kind) {
-    return kind == TLSPH_CLAMPED || kind == TLSPH_ROLLER || kind == TLSPH_TANGENT;
-}
 
 /* Adds what is new in direction e to the orthonormal fixed directions of a particle (Gram-Schmidt). */
 static void tlsphi_fix_direction(tlsphi_plan *plan, uint32_t host, const double e[3]) {
@@ -7460,8 +7785,10 @@ static tlsph_result tlsphi_plan_conditions(tlsphi_plan *plan) {
     if (!plan->fixed || !plan->fixed_direction) return tlsphi_no_memory(plan, 73.0 * (double)plan->n);
     for (size_t k = 0; k < d->condition_count; k++)
         for (size_t i = 0; tlsphi_is_constraint(d->conditions[k].kind) && i < tlsphi_set_size(plan, d->conditions + k);
-             i++)
-            tlsphi_fix_particle(plan, d->conditions + k, tlsphi_set_host(d->conditions + k, i));
+             i++) {
+            const uint32_t host = tlsphi_set_host(d->conditions + k, i);
+            if (!tlsphi_owns_surface(d, host)) tlsphi_fix_particle(plan, d->conditions + k, host);
+        }
     return TLSPH_OK;
 }
 
@@ -7716,7 +8043,7 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     double *g = TLSPHI_SCRATCH(plan, double, D *most);
     uint32_t *parent = TLSPHI_SCRATCH(plan, uint32_t, plan->n);
     if (!list || !g || !parent) return tlsphi_no_memory(plan, 32.0 * (double)most);
-    if (desc->operator_kind == TLSPH_CORRECTED_KERNEL && !tlsphi_needs_bonds(desc) &&
+    if (((desc->operator_kind == TLSPH_CORRECTED_KERNEL && !tlsphi_needs_bonds(desc)) || tlsphi_has_moments(desc)) &&
         !(plan->correction = TLSPHI_SCRATCH(plan, double, D *D * plan->n)))
         return tlsphi_no_memory(plan, 72.0 * (double)plan->n);
     if (tlsphi_needs_bonds(desc) && !(plan->bond = TLSPHI_SCRATCH(plan, tlsphi_bond, plan->n)))
@@ -7775,6 +8102,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->blocks = plan->blocks;
     s->bodies = plan->bodies;
     s->fixes = plan->fixes;
+    s->held_parts = plan->held_parts;
     s->mirrors = plan->mirrors;
     s->material_count = d->material_count;
     s->closure = plan->closure;
@@ -7883,6 +8211,8 @@ static void tlsphi_layout_loads(tlsph_solver *s, tlsphi_arena *arena, const tlsp
         load.X = TLSPHI_TAKE(arena, tlsph_real, c->values ? 3 * count : 0);
         load.x = TLSPHI_TAKE(arena, tlsph_real, c->values ? 3 * count : 0);
         load.before = TLSPHI_TAKE(arena, tlsph_real, c->kind == TLSPH_VELOCITY ? count : 0);
+        if (tlsphi_has_moments(plan->desc) && (has_area || c->kind == TLSPH_VELOCITY || c->kind == TLSPH_TEMPERATURE))
+            load.part = TLSPHI_TAKE(arena, tlsphi_part, count);
         if (s->load && !arena->overflow) s->load[at++] = load;
     }
 }
@@ -7917,6 +8247,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->mirror = TLSPHI_TAKE(arena, tlsphi_mirror, s->mirrors ? s->mirrors + 1 : 0);
     if (s->mirrors) s->mirror_of = TLSPHI_TAKE(arena, uint32_t, n);
     tlsphi_layout_loads(s, arena, plan);
+    s->held_part = TLSPHI_TAKE(arena, tlsphi_held_part, s->held_parts);
     const size_t before_pairs = arena->used;
     s->first = TLSPHI_TAKE(arena, size_t, n + 1);
     s->size.bytes_per_particle = (before_pairs - fixed + (n + 1) * sizeof(size_t)) / n;
@@ -8003,9 +8334,10 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
             s->neighbour[start + i] = list[i];
             for (size_t k = 0; k < D; k++) {
                 const double C = middle[k];
+                const int behind = plan->closed_C && s->M; /* there sum g is the area vector itself */
                 if (s->rest) s->rest[D * (start + i) + k] = (tlsph_real)(mine[k] - C);
                 s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
-                B[k] -= C;
+                B[k] -= behind ? g[D * i + k] : C;
                 square += mine[k] * mine[k];
             }
             sum += sqrt(square);
@@ -8138,16 +8470,68 @@ static void tlsphi_fill_turns(tlsph_solver *s) {
 /* Reference area of a load on one particle: given, or from the operator's boundary vector. */
 static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, const tlsph_condition *c, size_t i) {
     const size_t D = (size_t)s->dim, a = load->inner[i];
-    const tlsph_real *B = s->B + D * a, NN = tlsphi_dot(s->dim, c->normal, c->normal);
-    const tlsph_real along = NN > 0 ? tlsphi_dot(s->dim, B, c->normal) / tlsphi_sqrt(NN) : 0;
+    const tlsph_real *B = s->B + D * a, *N = tlsphi_condition_face(s->dim, c);
+    const tlsph_real size = N ? tlsphi_sqrt(tlsphi_dot(s->dim, N, N)) : 0, along = N ? tlsphi_dot(s->dim, B, N) / size : 0;
     if (c->kind == TLSPH_PRESSURE) {
-        for (size_t k = 0; k < D; k++)
-            load->area[D * i + k] = c->areas ? c->areas[3 * i + k]
-                                    : NN > 0 ? along * c->normal[k] / tlsphi_sqrt(NN)
-                                             : B[k];
+        for (size_t k = 0; k < D; k++) {
+            load->area[D * i + k] = c->areas ? c->areas[3 * i + k] : N ? along * N[k] / size : B[k];
+            for (size_t l = 0; load->part && c->areas && l < D; l++)
+                load->part[i].T[D * k + l] = c->areas[3 * i + k] * load->part[i].o[l];
+        }
         return;
     }
-    load->area[i] = c->areas ? c->areas[i] : NN > 0 ? along : tlsphi_sqrt(tlsphi_dot(s->dim, B, B));
+    load->area[i] = c->areas ? c->areas[i] : N == c->face ? tlsphi_abs(along) : N ? along : tlsphi_sqrt(tlsphi_dot(s->dim, B, B));
+}
+/* The part of particle a's share of the surface that a condition means: all, or N N.B with moment N (x) T^T N. */
+static tlsphi_part tlsphi_part_of(const tlsph_solver *s, const tlsphi_plan *plan, const tlsph_condition *c, size_t a) {
+    const size_t D = (size_t)s->dim;
+    const tlsph_real *T = plan->desc->particles.moments + 9 * plan->host[a], *N = tlsphi_condition_face(s->dim, c);
+    const tlsph_real NN = N ? tlsphi_dot(s->dim, N, N) : 1, along = N ? tlsphi_dot(s->dim, s->B + D * a, N) / NN : 0;
+    tlsphi_part out;
+    memset(&out, 0, sizeof out);
+    for (size_t i = 0; i < D; i++) out.B[i] = N ? along * N[i] : s->B[D * a + i];
+    for (size_t i = 0; i < D * D; i++)
+        for (size_t k = 0; k < D; k++)
+            out.T[i] += N ? N[i / D] * N[k] * T[3 * k + i % D] / NN : k == i / D ? T[3 * k + i % D] : 0;
+    for (size_t i = 0; i < D; i++)
+        for (size_t k = 0; k < D; k++)
+            out.o[i] += out.T[D * k + i] * out.B[k] * tlsphi_inverse_or_0(tlsphi_dot(3, out.B, out.B));
+    return out;
+}
+/* Parts whose velocity is held, sorted by particle: count into the particles' first part, then place. */
+static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
+    const tlsph_desc *d = plan->desc;
+    const size_t D = (size_t)s->dim;
+    size_t *at = s->held_parts ? TLSPHI_SCRATCH(plan, size_t, s->n + 1) : NULL;
+    if (!s->held_parts) return TLSPH_OK;
+    if (!at) return tlsphi_no_memory(plan, 8.0 * (double)s->n);
+    for (int pass = 0; pass < 2; pass++) {
+        uint32_t load = 0;
+        for (size_t k = 0; k < d->condition_count; k++) {
+            const tlsph_condition *c = d->conditions + k;
+            for (size_t i = 0; tlsphi_holds_velocity(c->kind) && i < tlsphi_set_size(plan, c); i++) {
+                const uint32_t host = tlsphi_set_host(c, i), a = plan->inner[host];
+                double W[9], N[3] = {0, 0, 0};
+                if (!tlsphi_owns_surface(d, host)) continue;
+                if (!pass) at[a + 1]++;
+                if (!pass) continue;
+                tlsphi_held_part *h = s->held_part + at[a]++;
+                memset(h, 0, sizeof *h);
+                h->particle = a;
+                h->load = c->kind == TLSPH_VELOCITY ? load : TLSPHI_NONE;
+                h->item = (uint32_t)i;
+                h->along = c->kind == TLSPH_TANGENT ? -1 : c->kind != TLSPH_CLAMPED && tlsphi_dot(s->dim, c->normal, c->normal) > 0;
+                if (h->along) tlsphi_unit_normal(c, s->dim, N);
+                tlsphi_closed_moment(plan, host, W);
+                for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
+                for (size_t j = 0; j < D * D; j++) h->W[j] = (tlsph_real)(W[3 * (j / D) + j % D] / tlsphi_plan_volume(plan, host));
+                h->part = tlsphi_part_of(s, plan, c, a);
+            }
+            load += !tlsphi_is_constraint(c->kind);
+        }
+        for (size_t a = 0; !pass && a < s->n; a++) at[a + 1] += at[a];
+    }
+    return TLSPH_OK;
 }
 static void tlsphi_fill_loads(tlsph_solver *s, const tlsphi_plan *plan) {
     size_t at = 0;
@@ -8159,6 +8543,7 @@ static void tlsphi_fill_loads(tlsph_solver *s, const tlsphi_plan *plan) {
         for (size_t i = 0; i < load->given.count; i++) {
             load->host[i] = tlsphi_set_host(c, i);
             load->inner[i] = plan->inner[load->host[i]];
+            if (load->part) load->part[i] = tlsphi_part_of(s, plan, c, load->inner[i]);
             if (has_area) tlsphi_fill_area(s, load, c, i);
         }
         load->given.particles = NULL;
@@ -8227,6 +8612,8 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     tlsphi_fill_mirrors(s, plan);
     tlsphi_fill_turns(s);
     tlsphi_fill_loads(s, plan);
+    const tlsph_result held = tlsphi_fill_held_parts(s, plan);
+    if (held) return held;
     s->fingerprint = tlsphi_fingerprint(s);
     tlsphi_no_error(&s->error);
     for (size_t a = 0; s->thermal && a < s->n; a++) tlsphi_set_temperature(s, a, tlsphi_material_of(s, a)->theta_R);
@@ -8868,8 +9255,9 @@ static tlsphi_poly *tlsphi_voronoi_cell(tlsphi_voronoi *v, size_t a, double spac
     }
     return now;
 }
-/* Facets that meet a cell, cut by its planes, relative to X_a. Returns how many; beyond the capacity they only count. */
-static int tlsphi_voronoi_patches(tlsphi_voronoi *v, size_t a, tlsphi_split_level *cell, double B[3], double *area) {
+/* Facets that meet a cell, cut by its planes, relative to X_a. Returns how many; beyond the capacity they only count. B: area
+   vector, followed by the moment T, row by row. */
+static int tlsphi_voronoi_patches(tlsphi_voronoi *v, size_t a, tlsphi_split_level *cell, double B[12], double *area) {
     double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300}, X[3] = {0, 0, 0};
     size_t from[3], to[3], at[3];
     int found = 0;
@@ -8912,19 +9300,19 @@ static int tlsphi_voronoi_patches(tlsphi_voronoi *v, size_t a, tlsphi_split_leve
                     const double size = tlsphi_patch_area(p, part, centre);
                     if (!(size > 0)) continue;
                     *area += size;
-                    for (int l = 0; l < 3; l++) B[l] += part[l];
+                    for (int l = 0; l < 12; l++) B[l] += l < 3 ? part[l] : part[l / 3 - 1] * centre[l % 3];
                     if (cell->patches < TLSPHI_PATCHES) cell->patch[cell->patches++] = *p;
                     found++;
                 }
             }
     return found;
 }
-/* V_a, B_a (for prisms: of their height) and the area of the surface in the cell. */
-static double tlsphi_voronoi_particle(tlsphi_voronoi *v, size_t a, double spacing, double B[3], double *area) {
+/* V_a, B_a, T_a (for prisms: of their height) and the area of the surface in the cell. */
+static double tlsphi_voronoi_particle(tlsphi_voronoi *v, size_t a, double spacing, double B[12], double *area) {
     tlsphi_split_level *cell = v->level + 2;
     double moment[3], centre[3];
     cell->poly = *tlsphi_voronoi_cell(v, a, spacing);
-    B[0] = B[1] = B[2] = 0;
+    memset(B, 0, 12 * sizeof *B);
     const int found = tlsphi_voronoi_patches(v, a, cell, B, area);
     if (!found) return tlsphi_poly_volume(&cell->poly, moment);
     if (found > TLSPHI_PATCHES) { /* a surface much finer than the particles: locally its mean plane */
@@ -9181,12 +9569,12 @@ static void tlsphi_voronoi_balance(const tlsphi_voronoi *v, const tlsphi_mesh *m
     }
 }
 static tlsph_result tlsphi_voronoi_measure(tlsphi_voronoi *v, const tlsphi_mesh *m, tlsph_real *volumes, tlsph_real *areas,
-                                           tlsph_error *error) {
+                                           tlsph_real *moments, tlsph_error *error) {
     const tlsph_particles *p = v->particles;
     double covered = 0, total = 0;
     for (size_t a = 0; a < p->count; a++) {
         const double spacing = (double)(p->spacings ? p->spacings[a] : p->spacing);
-        double B[3], area = 0;
+        double B[12], area = 0;
         for (size_t k = 0; k < (size_t)m->dim; k++) {
             const double x = (double)p->positions[3 * a + k], beyond = tlsphi_dmax(m->low[k] - x, x - m->high[k]);
             if (beyond > 1e-3 * spacing)
@@ -9199,6 +9587,8 @@ static tlsph_result tlsphi_voronoi_measure(tlsphi_voronoi *v, const tlsphi_mesh 
                                "more than 0: particles in the body or on its surface");
         volumes[a] = (tlsph_real)(V / height);
         for (int k = 0; k < 3; k++) areas[3 * a + (size_t)k] = k < m->dim ? (tlsph_real)(B[k] / height) : 0;
+        for (int k = 0; moments && k < 9; k++)
+            moments[9 * a + (size_t)k] = k / 3 < m->dim && k % 3 < m->dim ? (tlsph_real)(B[3 + k] / height) : 0;
         covered += area / height;
         total += V / height;
     }
@@ -9233,7 +9623,7 @@ static tlsph_result tlsphi_voronoi_begin(tlsphi_voronoi *v, const tlsphi_mesh *m
 }
 TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *particles, const tlsph_surface *surface,
                                       const tlsph_allocator *allocator, tlsph_real *volumes, tlsph_real *areas,
-                                      tlsph_error *error) {
+                                      tlsph_real *moments, tlsph_error *error) {
     tlsphi_voronoi v;
     tlsphi_mesh m;
     tlsph_desc desc;
@@ -9248,7 +9638,7 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
     memset(&v, 0, sizeof v);
     desc = tlsph_desc_default(dimension);
     desc.particles = *particles;
-    desc.particles.volumes = desc.particles.weights = desc.particles.areas = NULL;
+    desc.particles.volumes = desc.particles.weights = desc.particles.areas = desc.particles.moments = NULL;
     desc.particles.materials = NULL;
     v.plan.desc = &desc;
     v.plan.error = error;
@@ -9256,7 +9646,7 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
     tlsph_result r = tlsphi_check_particles(&v.plan);
     if (!r) r = tlsphi_mesh_make(&m, &v.plan, dimension, surface, error);
     if (!r) r = tlsphi_voronoi_begin(&v, &m, &desc);
-    if (!r) r = tlsphi_voronoi_measure(&v, &m, volumes, areas, error);
+    if (!r) r = tlsphi_voronoi_measure(&v, &m, volumes, areas, moments, error);
     tlsphi_plan_release(&v.plan);
     return r;
 }
@@ -9271,6 +9661,7 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
 
 #define TLSPHI_SHARP 0.85   /* cosine: edges that bend more are features */
 #define TLSPHI_RELAXATIONS 12
+#define TLSPHI_BEHIND 0.45  /* TLSPH_SCATTERED_INSIDE: least distance from the surface in spacings */
 #define TLSPHI_LINES 4096   /* of a lattice, at most, per axis */
 
 /* splitmix64: the same jitter everywhere for the same seed. */
@@ -9816,7 +10207,7 @@ static tlsph_result tlsphi_sample_faces(tlsphi_sampler *s) {
 /* A lattice that fits the bounds, or, where the spacing varies, random places that keep their distance. */
 static tlsph_result tlsphi_sample_inside(tlsphi_sampler *s) {
     const tlsphi_mesh *m = &s->mesh;
-    const int varies = s->fill->spacing_at != NULL;
+    const int varies = s->fill->spacing_at != NULL, inside = s->fill->placement == TLSPH_SCATTERED_INSIDE;
     size_t cells[3], i[3];
     double width[3];
     for (int k = 0; k < 3; k++) {
@@ -9835,13 +10226,14 @@ static tlsph_result tlsphi_sample_inside(tlsphi_sampler *s) {
                     for (size_t t = 0; t < tries; t++) {
                         for (int k = 0; k < 3; k++) {
                             const double shift = tlsphi_random(&s->random);
-                            X[k] = m->low[k] + width[k] * ((double)i[k] + (varies ? shift : (2 * shift - 1) * (double)s->fill->jitter));
+                            const double still = (inside ? 0.5 : 0) + (2 * shift - 1) * (double)s->fill->jitter;
+                            X[k] = m->low[k] + width[k] * ((double)i[k] + (varies ? shift : still));
                             if (k >= m->dim) X[k] = 0;
                         }
                         const double h = tlsphi_local_spacing(s->fill, X);
                         const double share = varies ? (m->dim == 3 ? 0.87 : 0.83) : 0.5;
                         if (tlsphi_sample_near(s, X, share * h, tlsphi_sample_any, NULL)) continue;
-                        if (!(tlsphi_sample_distance(s, X) < -0.5 * h)) continue;
+                        if (!(tlsphi_sample_distance(s, X) < -(inside ? TLSPHI_BEHIND : 0.5) * h)) continue;
                         const tlsph_result r = tlsphi_sample_add(s, X, 2);
                         if (r) return r;
                     }
@@ -9862,6 +10254,7 @@ static int tlsphi_sample_push(tlsphi_sampler *s, size_t b, const double d[3], do
 }
 /* Particles push each other apart, one after the other: faces within the surface, the inside by less than reaches it. */
 static void tlsphi_sample_relax(tlsphi_sampler *s) {
+    const double behind = s->fill->placement == TLSPH_SCATTERED_INSIDE ? TLSPHI_BEHIND : 0.4;
     const size_t bins = s->bins[0] * s->bins[1] * s->bins[2];
     for (int pass = 0; pass < TLSPHI_RELAXATIONS; pass++) {
         for (size_t a = 0; a < s->count; a++) {
@@ -9875,7 +10268,7 @@ static void tlsphi_sample_relax(tlsphi_sampler *s) {
             const double size = sqrt(tlsphi_dot3(push.move, push.move)), step = tlsphi_dmin(0.3, 0.15 / (size + 1e-300)) * push.h;
             for (int k = 0; k < 3; k++) Y[k] = X[k] + (k < s->mesh.dim ? step * push.move[k] : 0);
             if (s->kind[a] == 1) tlsphi_surface_distance(s, Y, X);
-            else if (tlsphi_sample_distance(s, Y) < -0.4 * push.h) memcpy(X, Y, sizeof Y);
+            else if (tlsphi_sample_distance(s, Y) < -behind * push.h) memcpy(X, Y, sizeof Y);
         }
         for (size_t b = 0; b < bins; b++) s->head[b] = TLSPHI_NONE;
         for (size_t a = 0; a < s->count; a++) tlsphi_sample_link(s, a);
@@ -9919,16 +10312,19 @@ static tlsph_result tlsphi_sample_begin(tlsphi_sampler *s, tlsph_fill *f, tlsph_
     }
     if (!(s->head = TLSPHI_SCRATCH(plan, uint32_t, total))) return tlsphi_no_memory(plan, 4.0 * (double)total);
     for (size_t b = 0; b < total; b++) s->head[b] = TLSPHI_NONE;
-    if ((r = tlsphi_sample_lines(s)) || (f->dimension == 3 && (r = tlsphi_sample_faces(s))) || (r = tlsphi_sample_inside(s)))
-        return r;
+    if (f->placement == TLSPH_SCATTERED && (r = tlsphi_sample_lines(s))) return r;
+    if (f->placement == TLSPH_SCATTERED && f->dimension == 3 && (r = tlsphi_sample_faces(s))) return r;
+    if ((r = tlsphi_sample_inside(s))) return r;
     tlsphi_sample_relax(s);
     return TLSPH_OK;
 }
 static tlsph_result tlsphi_sample_store(tlsphi_sampler *s, tlsph_cloud *cloud, tlsph_error *error) {
     const size_t n = s->count, dim = (size_t)s->fill->dimension;
     tlsphi_arena arena;
-    tlsph_real *X = NULL, *V = NULL, *w = NULL, *B = NULL, *h = NULL;
+    tlsph_real *X = NULL, *V = NULL, *w = NULL, *B = NULL, *h = NULL, *T = NULL;
+    const int inside = s->fill->placement == TLSPH_SCATTERED_INSIDE;
     tlsph_surface surface;
+    if (!n) return tlsphi_fail(error, TLSPH_ERROR_SIZE, "fill", "particles", TLSPH_NO_PARTICLE, 0, 0, "at least 1; refine the spacing");
     memset(&arena, 0, sizeof arena);
     for (int pass = 0; pass < 2; pass++) {
         arena.used = 0;
@@ -9937,6 +10333,7 @@ static tlsph_result tlsphi_sample_store(tlsphi_sampler *s, tlsph_cloud *cloud, t
         w = TLSPHI_TAKE(&arena, tlsph_real, n);
         B = TLSPHI_TAKE(&arena, tlsph_real, 3 * n);
         h = TLSPHI_TAKE(&arena, tlsph_real, n);
+        T = TLSPHI_TAKE(&arena, tlsph_real, inside ? 9 * n : 0);
         if (pass) break;
         cloud->memory_size = arena.size = arena.used;
         cloud->allocator = s->v.plan.allocator;
@@ -9955,12 +10352,13 @@ static tlsph_result tlsphi_sample_store(tlsphi_sampler *s, tlsph_cloud *cloud, t
     cloud->particles.volumes = V;
     cloud->particles.weights = w;
     cloud->particles.areas = B;
+    if (inside) cloud->particles.moments = T;
     cloud->particles.spacing = (tlsph_real)s->largest;
     if (s->fill->spacing_at) cloud->particles.spacings = h;
     for (size_t k = 0; k < dim; k++) cloud->cell_size[k] = (tlsph_real)s->largest;
     surface.count = s->mesh.facets;
     surface.corners = s->mesh.given;
-    return tlsph_voronoi((int)dim, &cloud->particles, &surface, &cloud->allocator, V, B, error);
+    return tlsph_voronoi((int)dim, &cloud->particles, &surface, &cloud->allocator, V, B, inside ? T : NULL, error);
 }
 /* surface: of boxes and the like, or none. */
 static tlsph_result tlsphi_cloud_scatter(const tlsph_fill *fill, const tlsph_surface *surface, tlsph_cloud *cloud,
@@ -10297,12 +10695,13 @@ static tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const c
                                      const char *allowed) {
     return tlsphi_fail(error, r, "fill", field, TLSPH_NO_PARTICLE, value, 0, allowed);
 }
+static int tlsphi_scatters(const tlsph_fill *f) { return f->placement >= TLSPH_SCATTERED; }
 static tlsph_result tlsphi_check_fill(const tlsph_fill *f, tlsph_error *error) {
     if (f->cookie != TLSPHI_COOKIE || f->dimension < 2 || f->dimension > 3 ||
-        (unsigned)f->shape > (unsigned)TLSPH_TRIANGLES || (unsigned)f->placement > (unsigned)TLSPH_SCATTERED ||
-        (f->shape == TLSPH_PREDICATE && (!f->inside || f->placement == TLSPH_SCATTERED)) ||
+        (unsigned)f->shape > (unsigned)TLSPH_TRIANGLES || (unsigned)f->placement > (unsigned)TLSPH_SCATTERED_INSIDE ||
+        (f->shape == TLSPH_PREDICATE && (!f->inside || tlsphi_scatters(f))) ||
         (f->shape == TLSPH_DISTANCE && !f->distance) ||
-        (f->shape == TLSPH_TRIANGLES && (!f->surface.count || f->placement != TLSPH_SCATTERED)) || f->axis < 0 || f->axis > 2)
+        (f->shape == TLSPH_TRIANGLES && (!f->surface.count || !tlsphi_scatters(f))) || f->axis < 0 || f->axis > 2)
         return tlsphi_fill_fail(error, TLSPH_ERROR_DESCRIPTION, "cookie, dimension, shape, placement, axis or inside",
                                 f->dimension, "what tlsph_fill_default sets");
     if (!tlsphi_all_finite(f->origin, 3) || !tlsphi_all_finite(f->size, 3) || !tlsphi_finite(f->spacing))
@@ -10362,7 +10761,7 @@ static tlsph_result tlsphi_lattice_make(tlsphi_lattice *l, tlsph_error *error) {
 }
 /* Boxes and L-shapes take their few large faces, all else the faces of the lattice's cells. */
 static tlsph_result tlsphi_cloud_voronoi(tlsphi_lattice *l, tlsph_cloud *cloud, tlsph_real *volumes,
-                                         tlsph_real *areas, tlsph_error *error) {
+                                         tlsph_real *areas, tlsph_real *moments, tlsph_error *error) {
     const int plain = l->fill->shape == TLSPH_BOX || l->fill->shape == TLSPH_L_SHAPE;
     tlsph_fill coarse = *l->fill;
     tlsphi_lattice few, *from = l;
@@ -10384,8 +10783,9 @@ static tlsph_result tlsphi_cloud_voronoi(tlsphi_lattice *l, tlsph_cloud *cloud, 
     surface.corners = faces.out;
     faces.count = 0;
     if (!r) tlsphi_each_cell(from, 0, tlsphi_cell_faces, &faces);
-    if (!r && l->fill->placement == TLSPH_SCATTERED) r = tlsphi_cloud_scatter(l->fill, &surface, cloud, error);
-    else if (!r) r = tlsph_voronoi(coarse.dimension, &cloud->particles, &surface, &l->allocator, volumes, areas, error);
+    if (!r && tlsphi_scatters(l->fill)) r = tlsphi_cloud_scatter(l->fill, &surface, cloud, error);
+    else if (!r)
+        r = tlsph_voronoi(coarse.dimension, &cloud->particles, &surface, &l->allocator, volumes, areas, moments, error);
     if (faces.out) l->allocator.release(l->allocator.user, faces.out, bytes);
     if (few.memory) few.allocator.release(few.allocator.user, few.memory, few.memory_size);
     return r;
@@ -10393,7 +10793,7 @@ static tlsph_result tlsphi_cloud_voronoi(tlsphi_lattice *l, tlsph_cloud *cloud, 
 static tlsph_result tlsphi_cloud_fill(tlsphi_lattice *l, tlsph_cloud *cloud, tlsph_error *error) {
     tlsphi_arena arena;
     tlsphi_fill_target t;
-    tlsph_real *areas = NULL;
+    tlsph_real *areas = NULL, *moments = NULL;
     const int on_faces = l->fill->placement == TLSPH_ON_FACES;
     const size_t n = l->particles, corners = on_faces ? l->body_cells << l->fill->dimension : 0;
     memset(&arena, 0, sizeof arena);
@@ -10406,6 +10806,7 @@ static tlsph_result tlsphi_cloud_fill(tlsphi_lattice *l, tlsph_cloud *cloud, tls
         t.share = TLSPHI_TAKE(&arena, tlsph_real, n);
         t.cells = TLSPHI_TAKE(&arena, uint32_t, corners);
         areas = TLSPHI_TAKE(&arena, tlsph_real, l->fill->voronoi ? 3 * n : 0);
+        moments = TLSPHI_TAKE(&arena, tlsph_real, l->fill->voronoi && !on_faces ? 9 * n : 0);
         if (pass) break;
         cloud->memory_size = arena.size = arena.used;
         cloud->memory = l->allocator.allocate(l->allocator.user, cloud->memory_size);
@@ -10434,7 +10835,8 @@ static tlsph_result tlsphi_cloud_fill(tlsphi_lattice *l, tlsph_cloud *cloud, tls
     cloud->particles.spacing = (tlsph_real)mean; /* the largest, as the papers take it */
     if (!l->fill->voronoi) return TLSPH_OK;
     cloud->particles.areas = areas;
-    return tlsphi_cloud_voronoi(l, cloud, t.V, areas, error);
+    if (!on_faces) cloud->particles.moments = moments;
+    return tlsphi_cloud_voronoi(l, cloud, t.V, areas, on_faces ? NULL : moments, error);
 }
 TLSPHI_DEF tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *cloud, tlsph_error *error) {
     tlsphi_lattice l;
@@ -10446,10 +10848,10 @@ TLSPHI_DEF tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *
     memset(&l, 0, sizeof l);
     l.fill = fill;
     l.allocator = tlsphi_allocator(&fill->allocator);
-    if (fill->placement != TLSPH_SCATTERED) {
+    if (!tlsphi_scatters(fill)) {
         r = tlsphi_lattice_make(&l, error);
         if (!r) r = tlsphi_cloud_fill(&l, cloud, error);
-    } else if (fill->shape == TLSPH_BOX || fill->shape == TLSPH_L_SHAPE) r = tlsphi_cloud_voronoi(&l, cloud, NULL, NULL, error);
+    } else if (fill->shape == TLSPH_BOX || fill->shape == TLSPH_L_SHAPE) r = tlsphi_cloud_voronoi(&l, cloud, NULL, NULL, NULL, error);
     else r = tlsphi_cloud_scatter(fill, NULL, cloud, error);
     if (r) tlsph_cloud_destroy(cloud);
     if (l.memory) l.allocator.release(l.allocator.user, l.memory, l.memory_size);
@@ -10489,6 +10891,16 @@ static int tlsphi_in_plane(void *user, const tlsph_real *X) {
 TLSPHI_DEF size_t tlsph_select_plane(const tlsph_particles *particles, int axis, tlsph_real value, tlsph_real tolerance,
                                      uint32_t *out, size_t capacity) {
     tlsphi_plane plane;
+    size_t found = 0;
+    const size_t k = (size_t)axis;
+    for (size_t a = 0; particles->moments && a < particles->count; a++) {
+        const tlsph_real B = particles->areas[3 * a + k], T = particles->moments[9 * a + 4 * k];
+        if (!(tlsphi_abs((particles->positions[3 * a + k] - value) * B + T) <= tolerance * tlsphi_abs(B))) continue;
+        if (!(tlsphi_abs(B) > 0)) continue;
+        if (found < capacity) out[found] = (uint32_t)a;
+        found++;
+    }
+    if (particles->moments) return found;
     plane.axis = axis;
     plane.value = value;
     plane.tolerance = tolerance;

@@ -507,7 +507,7 @@ static void fuzz_voronoi(reader *r)
     p.spacing = byte(r) % 4 ? 1 : number(r, 0.1, 2);
     if (byte(r) % 4 == 0) p.spacings = spacings;
     read_surface(r, dimension, corners, &surface);
-    const tlsph_result result = tlsph_voronoi(dimension, &p, &surface, NULL, V, B, &error);
+    const tlsph_result result = tlsph_voronoi(dimension, &p, &surface, NULL, V, B, NULL, &error);
     if (result) {
         DEMAND(error.result == result && error.message[0]);
         return;

@@ -111,32 +111,32 @@ TEST(surfaces_are_checked)
     surface.count = 4;
     surface.corners = corners;
     memcpy(corners, tetrahedron, sizeof corners);
-    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error), TLSPH_OK);
+    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, &error), TLSPH_OK);
     CHECK_CLOSE(V[0] + V[1] + V[2] + V[3], 1.0 / 6, 100 * EPSILON);
     surface.count = 3; /* the slanting face is missing: a leak along its edges */
     particles.count = 1;
     for (int i = 0; i < 9; i++) corners[i] = tetrahedron[27 + i];
     for (int i = 0; i < 18; i++) corners[9 + i] = tetrahedron[9 + i];
-    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error), TLSPH_ERROR_SURFACE);
+    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, &error), TLSPH_ERROR_SURFACE);
     CHECK(strstr(error.message, "leak") != NULL && strstr(error.message, "at (") != NULL);
     CHECK_CLOSE(error.position[2], 0, EPSILON); /* the hole is the face Z = 0 */
     memcpy(corners, tetrahedron, sizeof corners);
     surface.count = 4;
     for (int k = 0; k < 3; k++) { corners[3 + k] = tetrahedron[6 + k]; corners[6 + k] = tetrahedron[3 + k]; }
-    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error), TLSPH_ERROR_SURFACE);
+    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, &error), TLSPH_ERROR_SURFACE);
     CHECK(strstr(error.message, "flipped") != NULL);
     for (int f = 0; f < 4; f++) /* all of them: inside out */
         for (int k = 0; k < 3; k++) {
             corners[9 * f + 3 + k] = tetrahedron[9 * f + 6 + k];
             corners[9 * f + 6 + k] = tetrahedron[9 * f + 3 + k];
         }
-    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error), TLSPH_ERROR_SURFACE);
+    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, &error), TLSPH_ERROR_SURFACE);
     for (int i = 0; i < 3; i++) { /* no number; too large for a volume; far more facets than memory can hold */
         memcpy(corners, tetrahedron, sizeof corners);
         for (int c = 0; c < 36 && i < 2; c++)
             if (tetrahedron[c] > 0) corners[c] = i ? R(HUGE_VAL) : R(NAN);
         surface.count = i == 2 ? 2000000000u : 4;
-        CHECK(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error) != TLSPH_OK);
+        CHECK(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, &error) != TLSPH_OK);
         CHECK(error.message[0] != 0);
     }
 }
@@ -155,7 +155,7 @@ TEST(surfaces_through_each_other)
         particles.spacings = spacings; /* local ones do without a common one */
         memcpy(corners, tetrahedron, sizeof tetrahedron);
         for (int c = 0; c < 36; c++) corners[36 + c] = tetrahedron[c] + R(c % 3 ? 0 : shift);
-        CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL), i ? TLSPH_ERROR_SURFACE : TLSPH_OK);
+        CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, NULL), i ? TLSPH_ERROR_SURFACE : TLSPH_OK);
         if (!i) CHECK_CLOSE(V[0] + V[1], 1.0 / 3, 100 * EPSILON);
     }
 }
@@ -173,7 +173,7 @@ TEST(particles_outside_are_refused)
     particles.spacing = R(0.7);
     surface.count = 4;
     surface.corners = tetrahedron;
-    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, &error), TLSPH_ERROR_VOLUME);
+    CHECK_RESULT(tlsph_voronoi(3, &particles, &surface, NULL, V, B, NULL, &error), TLSPH_ERROR_VOLUME);
     CHECK_SAME(error.particle, 1);
 }
 

@@ -96,14 +96,14 @@ TEST(parts_that_may_be_missing)
     p.count = 1;
     p.positions = X;
     p.spacing = 1;
-    CHECK_RESULT(tlsph_voronoi(2, &p, &surface, &half, V, B, NULL), TLSPH_OK);
+    CHECK_RESULT(tlsph_voronoi(2, &p, &surface, &half, V, B, NULL, NULL), TLSPH_OK);
     CHECK(!called);
     CHECK_CLOSE(V[0], 1, 100 * EPSILON);
     surface.count = 0;
-    CHECK_RESULT(tlsph_voronoi(2, &p, &surface, NULL, V, B, NULL), TLSPH_ERROR_SURFACE);
+    CHECK_RESULT(tlsph_voronoi(2, &p, &surface, NULL, V, B, NULL, NULL), TLSPH_ERROR_SURFACE);
     surface.corners = NULL;
     surface.count = 4;
-    CHECK_RESULT(tlsph_voronoi(2, &p, &surface, NULL, V, B, NULL), TLSPH_ERROR_SURFACE);
+    CHECK_RESULT(tlsph_voronoi(2, &p, &surface, NULL, V, B, NULL, NULL), TLSPH_ERROR_SURFACE);
     out.gradient = gradient; /* linear: that of x is (1, 0) */
     CHECK_RESULT(tlsph_reproduce(&nodes, X, &out, NULL), TLSPH_OK);
     CHECK_CLOSE(gradient[0] * nodes_at[0] + gradient[3] * nodes_at[3] + gradient[6] * nodes_at[6], 1, 100 * EPSILON);
@@ -331,7 +331,7 @@ TEST(a_surface_finer_than_the_particles)
     }
     p.positions = X;
     p.spacing = R(0.5);
-    if (CHECK_RESULT(tlsph_voronoi(3, &p, &surface, NULL, V, B, &error), TLSPH_OK)) {
+    if (CHECK_RESULT(tlsph_voronoi(3, &p, &surface, NULL, V, B, NULL, &error), TLSPH_OK)) {
         for (size_t a = 0; a < p.count; a++) {
             CHECK(V[a] > R(0.5 * 0.125) && V[a] < R(3 * 0.125));
             total += (double)V[a];

@@ -146,15 +146,15 @@ TEST(surfaces_near_the_limits)
     particles.count = 1;
     particles.positions = X;
     particles.spacing = 1;
-    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V, B, NULL), TLSPH_OK);
+    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V, B, NULL, NULL), TLSPH_OK);
     for (size_t i = 0; i < EDGES; i++) {
         particles.count = edges[i];
         if (edges[i] > 0xfffffffeu)
-            CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V, B, NULL), TLSPH_ERROR_ARGUMENT);
+            CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V, B, NULL, NULL), TLSPH_ERROR_ARGUMENT);
         particles.count = 1;
         if (edges[i] <= 1000000000u) continue; /* of 32 bits: so many facets are allowed */
         surface.count = edges[i];
-        CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V, B, NULL), TLSPH_ERROR_SURFACE);
+        CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V, B, NULL, NULL), TLSPH_ERROR_SURFACE);
         fill.shape = TLSPH_TRIANGLES;
         fill.placement = TLSPH_SCATTERED;
         fill.surface = surface;
@@ -175,12 +175,12 @@ TEST(surfaces_near_the_limits)
     particles.spacings = spacings;
     tlsph_real two[6] = {R(0.2), R(0.5), 0, R(0.8), R(0.5), 0}, V2[2], B2[6];
     particles.positions = two;
-    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V2, B2, NULL), TLSPH_ERROR_ARGUMENT);
+    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V2, B2, NULL, NULL), TLSPH_ERROR_ARGUMENT);
     spacings[1] = 0;
-    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V2, B2, NULL), TLSPH_ERROR_VOLUME);
+    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V2, B2, NULL, NULL), TLSPH_ERROR_VOLUME);
     particles.spacings = NULL;
     two[1] = R(HUGE_VAL);
-    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V2, B2, NULL), TLSPH_ERROR_NOT_FINITE);
+    CHECK_RESULT(tlsph_voronoi(2, &particles, &surface, NULL, V2, B2, NULL, NULL), TLSPH_ERROR_NOT_FINITE);
 }
 TEST(normals_and_lengths_near_the_limits)
 {
@@ -316,7 +316,7 @@ TEST(every_argument_of_voronoi_is_checked)
         p.spacing = R(i == 7 ? 0 : 1);
         const tlsph_result result =
             tlsph_voronoi(i == 3 ? 1 : i == 4 ? 4 : 2, i == 0 ? NULL : &p, i == 1 ? NULL : &surface, NULL, i == 2 ? NULL : V,
-                          i == 8 ? NULL : B, NULL);
+                          i == 8 ? NULL : B, NULL, NULL);
         CHECK_RESULT(result, TLSPH_ERROR_ARGUMENT);
     }
 }

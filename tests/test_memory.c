@@ -497,7 +497,7 @@ static tlsph_result make_voronoi(const void *what, const tlsph_allocator *alloca
     particles.count = 2;
     particles.positions = positions;
     particles.spacing = 1;
-    const tlsph_result result = tlsph_voronoi(3, &particles, &surface, allocator, volumes, areas, error);
+    const tlsph_result result = tlsph_voronoi(3, &particles, &surface, allocator, volumes, areas, NULL, error);
     if (result) CHECK(volumes[0] < 0 && volumes[1] < 0 && areas[0] < 0 && areas[5] < 0);
     else CHECK_CLOSE(volumes[0] + volumes[1], 1.0 / 6, 100 * EPSILON);
     return result;

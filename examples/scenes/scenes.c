@@ -59,6 +59,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = choice("operator", &o->operator_kind, "corrected|cells|W0|W1|bond0|bond|cells4",
                         "corrected kernel, dual faces of cells, the same of order 4; 002: kernels of order 0 and 1, with bonds");
     table[i++] = choice("kernel", &o->kernel, "cubic|quadratic|wendland2|wendland4", "of the operators with kernels");
+    table[i++] = choice("placement", &o->placement, "faces|cells", "of clouds: particles on their surface, or all behind it");
     table[i++] = real("support", &o->support, "spacings", 0.5, 4, "smoothing length h; neighbours within 2h");
     table[i++] = choice("dissipation", &o->dissipation, "limited|reconstructed|first|printed|jst|none", "upwinding");
     table[i++] = real("harmonic", &o->harmonic, "", 0, 100, "eta2 of the dissipation jst (002-28)");
@@ -107,13 +108,15 @@ void scene_options_cloud(scene_options *options, tlsph_fill *fill) {
     options->kernel = TLSPH_WENDLAND_C2;
     options->support = 0.825;
     fill->voronoi = 1;
+    if (options->placement)
+        fill->placement = fill->placement == TLSPH_SCATTERED ? TLSPH_SCATTERED_INSIDE : TLSPH_CELL_CENTRED;
 }
 
 void scene_options_scatter(scene_options *options, tlsph_fill *fill, tlsph_length_fn distance, void *user) {
     if (options->operator_kind == TLSPH_CELLS) options->operator_kind = TLSPH_CORRECTED_KERNEL;
-    scene_options_cloud(options, fill);
     fill->shape = TLSPH_DISTANCE;
     fill->placement = TLSPH_SCATTERED;
+    scene_options_cloud(options, fill);
     fill->distance = distance;
     fill->distance_user = user;
 }
@@ -194,13 +197,6 @@ tlsph_condition *scene_add(scene_setup *setup, tlsph_condition_kind kind) {
     return condition;
 }
 
-typedef struct plane { int axis; double value, tolerance; } plane;
-
-static int on_plane(void *user, const tlsph_real X[3]) {
-    const plane *p = user;
-    return fabs((double)X[p->axis] - p->value) <= p->tolerance;
-}
-
 tlsph_condition *scene_add_where(scene_setup *setup, tlsph_condition_kind kind, tlsph_inside_fn inside, void *user) {
     const tlsph_particles *particles = &setup->body.cloud.particles;
     tlsph_condition *condition = scene_add(setup, kind);
@@ -213,16 +209,24 @@ tlsph_condition *scene_add_where(scene_setup *setup, tlsph_condition_kind kind, 
 }
 
 tlsph_condition *scene_add_plane(scene_setup *setup, tlsph_condition_kind kind, int axis, double value) {
-    plane p = { axis, value, 1e-3 * (double)setup->body.cloud.cell_size[axis] };
-    tlsph_condition *condition = scene_add_where(setup, kind, on_plane, &p);
-    condition->normal[axis] = 1;
+    const tlsph_particles *particles = &setup->body.cloud.particles;
+    const tlsph_real close = setup->body.cloud.cell_size[axis] / 1000;
+    tlsph_condition *condition = scene_add(setup, kind);
+    uint32_t *list = scene_keep(setup, particles->count * sizeof *list);
+    if (list) condition->count = tlsph_select_plane(particles, axis, (tlsph_real)value, close, list, particles->count);
+    condition->particles = list;
+    condition->normal[axis] = condition->face[axis] = 1;
     return condition;
 }
 
+/* Of the particles, or of their shares of the surface. */
 static void extent(const tlsph_particles *particles, int axis, double *low, double *high) {
     *low = *high = particles->count ? (double)particles->positions[axis] : 0;
     for (size_t i = 0; i < particles->count; i++) {
-        const double x = (double)particles->positions[3 * i + (size_t)axis];
+        const size_t k = (size_t)axis;
+        const double B = particles->moments ? (double)particles->areas[3 * i + k] : 0;
+        const double x = (double)particles->positions[3 * i + k] +
+                         (fabs(B) > 0 ? (double)particles->moments[9 * i + 4 * k] / B : 0);
         *low = fmin(*low, x);
         *high = fmax(*high, x);
     }

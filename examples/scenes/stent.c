@@ -169,7 +169,7 @@ static tlsph_result make_cloud(const grid *g, tlsph_cloud *cloud, tlsph_error *e
         cloud->particles.spacing = (tlsph_real)g->p->spacing;
         surface.count = surface_of(g, corners);
         surface.corners = corners;
-        result = tlsph_voronoi(3, &cloud->particles, &surface, NULL, block + 3 * n, block + 4 * n, error);
+        result = tlsph_voronoi(3, &cloud->particles, &surface, NULL, block + 3 * n, block + 4 * n, NULL, error);
     }
     free(corners);
     return result;
