@@ -3484,12 +3484,12 @@ typedef struct tlsphi_fix {
 
 /* Particles behind the surface: the part of a particle's share of it that a condition means; see [SURFACES]. */
 typedef struct tlsphi_part {
-    tlsph_real B[3], T[9], o[3]; /* area vector, moment, middle seen from X_a */
+    tlsph_real B[3], T[9], o[3], W[9]; /* area vector, moment, middle seen from X_a; M^-1 of the particle */
 } tlsphi_part;
 typedef struct tlsphi_held_part {
     uint32_t particle, load, item; /* whose values are `wanted`; load TLSPHI_NONE: at rest */
     int along;                     /* 0: all components are held, 1: that along N, -1: those across N */
-    tlsph_real N[3], W[9];         /* W = M^-1 */
+    tlsph_real N[3];
     tlsph_real wanted[3], jump[3]; /* v of the surface, and what the extrapolated v lacks of it */
     tlsphi_part part;
 } tlsphi_held_part;
@@ -4334,7 +4334,7 @@ static void tlsphi_held_components(int dim, const tlsphi_held_part *h, tlsph_rea
 static void tlsphi_stress_behind(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *P) {
     tlsph_real PM[9];
     tlsphi_row_get(s, s->rows.PM, s->dim * s->dim, h->particle, PM);
-    tlsphi_product(s->dim, PM, h->W, P);
+    tlsphi_product(s->dim, PM, h->part.W, P);
 }
 /* Adds the jumps at the held parts [h, end) of one particle to its gradients, and their power to E. */
 static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tlsphi_held_part *end) {
@@ -4368,7 +4368,7 @@ static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_par
     tlsphi_stress_behind(s, h, P);
     tlsphi_row_get(s, s->rows.A, dim * dim, a, A);
     tlsphi_row_get(s, s->rows.wave, 3, a, wave);
-    tlsphi_product(dim, A, h->W, H);
+    tlsphi_product(dim, A, h->part.W, H);
     tlsphi_multiply(dim, H, h->part.B, c);
     const tlsph_real half = wave[2] * tlsphi_sqrt(tlsphi_dot(dim, h->part.B, h->part.B)) / 2;
     const tlsph_real normal = tlsphi_dot(dim, c, h->jump) * tlsphi_inverse_or_0(tlsphi_dot(dim, c, c));
@@ -5508,11 +5508,21 @@ static void tlsphi_heat(tlsph_solver *s, size_t a, tlsph_real power, double weig
     s->account.external_heat += weight * (double)power;
     s->account.external_entropy += weight * (double)(power / theta);
 }
+/* Behind a surface of prescribed temperature its heat -Q.B has the moment -Q T; the particle itself is held. */
+static void tlsphi_held_heat(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real *arm) {
+    tlsph_real heat[3], Q[3];
+    tlsphi_row_get(s, s->rows.heat, s->dim, load->inner[i], heat);
+    tlsphi_multiply_transposed(s->dim, load->part[i].W, heat, Q);
+    tlsphi_multiply_transposed(s->dim, load->part[i].T, Q, arm);
+    for (int k = 0; k < s->dim; k++) arm[k] *= -*tlsphi_theta(s, load->inner[i]);
+}
 static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
+    const int held = load->given.kind == TLSPH_TEMPERATURE;
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        tlsph_real power = tlsphi_heat_power(s, load, i), arm[3] = {0, 0, 0};
+        tlsph_real power = held ? 0 : tlsphi_heat_power(s, load, i), arm[3] = {0, 0, 0};
         for (int k = 0; load->part && k < s->dim; k++) arm[k] = power * load->part[i].o[k];
+        if (held) tlsphi_held_heat(s, load, i, arm);
         for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
             const tlsph_real y = tlsphi_share_behind(s, a, k, arm);
             tlsphi_heat(s, s->neighbour[k], y, stage->rate_weight * dt);
@@ -5546,6 +5556,7 @@ static void tlsphi_apply_loads(tlsph_solver *s, const tlsphi_stage *stage, doubl
     for (size_t i = 0; i < s->loads; i++) {
         tlsphi_load *load = s->load + i;
         const tlsph_condition_kind kind = load->given.kind;
+        if (kind == TLSPH_TEMPERATURE && load->part && s->heat_moves) tlsphi_apply_heat(s, load, stage, dt);
         if (kind == TLSPH_VELOCITY || kind == TLSPH_TEMPERATURE || kind == TLSPH_WALL) continue;
         if (tlsphi_is_thermal(kind) && s->heat_moves < s->conducts) continue; /* heats in the conduction's own stages */
         tlsphi_load_values(s, load, s->time + stage->start * dt);
@@ -8488,7 +8499,10 @@ static tlsphi_part tlsphi_part_of(const tlsph_solver *s, const tlsphi_plan *plan
     const tlsph_real *T = plan->desc->particles.moments + 9 * plan->host[a], *N = tlsphi_condition_face(s->dim, c);
     const tlsph_real NN = N ? tlsphi_dot(s->dim, N, N) : 1, along = N ? tlsphi_dot(s->dim, s->B + D * a, N) / NN : 0;
     tlsphi_part out;
+    double A[9];
     memset(&out, 0, sizeof out);
+    tlsphi_closed_moment(plan, plan->host[a], A);
+    for (size_t j = 0; j < D * D; j++) out.W[j] = (tlsph_real)A[3 * (j / D) + j % D] / s->V[a];
     for (size_t i = 0; i < D; i++) out.B[i] = N ? along * N[i] : s->B[D * a + i];
     for (size_t i = 0; i < D * D; i++)
         for (size_t k = 0; k < D; k++)
@@ -8501,7 +8515,6 @@ static tlsphi_part tlsphi_part_of(const tlsph_solver *s, const tlsphi_plan *plan
 /* Parts whose velocity is held, sorted by particle: count into the particles' first part, then place. */
 static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
     const tlsph_desc *d = plan->desc;
-    const size_t D = (size_t)s->dim;
     size_t *at = s->held_parts ? TLSPHI_SCRATCH(plan, size_t, s->n + 1) : NULL;
     if (!s->held_parts) return TLSPH_OK;
     if (!at) return tlsphi_no_memory(plan, 8.0 * (double)s->n);
@@ -8511,7 +8524,7 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
             const tlsph_condition *c = d->conditions + k;
             for (size_t i = 0; tlsphi_holds_velocity(c->kind) && i < tlsphi_set_size(plan, c); i++) {
                 const uint32_t host = tlsphi_set_host(c, i), a = plan->inner[host];
-                double W[9], N[3] = {0, 0, 0};
+                double N[3] = {0, 0, 0};
                 if (!tlsphi_owns_surface(d, host)) continue;
                 if (!pass) at[a + 1]++;
                 if (!pass) continue;
@@ -8522,9 +8535,7 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
                 h->item = (uint32_t)i;
                 h->along = c->kind == TLSPH_TANGENT ? -1 : c->kind != TLSPH_CLAMPED && tlsphi_dot(s->dim, c->normal, c->normal) > 0;
                 if (h->along) tlsphi_unit_normal(c, s->dim, N);
-                tlsphi_closed_moment(plan, host, W);
                 for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
-                for (size_t j = 0; j < D * D; j++) h->W[j] = (tlsph_real)(W[3 * (j / D) + j % D] / tlsphi_plan_volume(plan, host));
                 h->part = tlsphi_part_of(s, plan, c, a);
             }
             load += !tlsphi_is_constraint(c->kind);
@@ -8616,7 +8627,10 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     if (held) return held;
     s->fingerprint = tlsphi_fingerprint(s);
     tlsphi_no_error(&s->error);
-    for (size_t a = 0; s->thermal && a < s->n; a++) tlsphi_set_temperature(s, a, tlsphi_material_of(s, a)->theta_R);
+    for (size_t a = 0; s->thermal && a < s->n; a++) {
+        *tlsphi_theta(s, a) = tlsphi_material_of(s, a)->theta_R;
+        tlsphi_set_temperature(s, a, tlsphi_material_of(s, a)->theta_R);
+    }
     tlsphi_stage start;
     memset(&start, 0, sizeof start);
     start.a = 1; /* the driven velocity replaces the old one, which is zero */

@@ -275,7 +275,7 @@ TEST(every_entry_of_a_fill_is_checked)
         case 1: f.dimension = 1; break;
         case 2: f.dimension = 4; break;
         case 3: f.shape = (tlsph_shape)(TLSPH_TRIANGLES + 1); break;
-        case 4: f.placement = (tlsph_placement)(TLSPH_SCATTERED + 1); break;
+        case 4: f.placement = (tlsph_placement)(TLSPH_SCATTERED_INSIDE + 1); break;
         case 5: f.shape = TLSPH_PREDICATE; break;
         case 6: f.shape = TLSPH_DISTANCE; break;
         case 7: f.shape = TLSPH_TRIANGLES; break;
