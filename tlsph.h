@@ -3489,6 +3489,7 @@ typedef struct tlsphi_part {
 typedef struct tlsphi_held_part {
     uint32_t particle, load, item; /* whose values are `wanted`; load TLSPHI_NONE: at rest */
     int along;                     /* 0: all components are held, 1: that along N, -1: those across N */
+    int mirror;                    /* the other components do not change along N */
     tlsph_real N[3];
     tlsph_real wanted[3], jump[3]; /* v of the surface, and what the extrapolated v lacks of it */
     tlsphi_part part;
@@ -4298,6 +4299,8 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
    S: the components that are held. Its power is that of the wall, so E stays exact. Linear fields and uniform stress are
    exact for any u and S, so parts of different conditions may meet in a particle. The wall damps, too, by half of the
    impedance: D = rho |B|/2 (c_p nn + c_s (I - nn)) S (u - v_o), heat D.(u - v_o) >= 0.
+   At a mirror (roller, tangentially fixed) the other components are even: their v_o is v_a + grad v_a (I - NN) o, which halves
+   their slope along N as the image of the particle would.
    A prescribed temperature fixes theta_a so that theta_o is the given one. */
 
 /* Of a force of first moment Z = force (x) arm about X_a: what the k-th neighbour of a takes. */
@@ -4336,6 +4339,20 @@ static void tlsphi_stress_behind(const tlsph_solver *s, const tlsphi_held_part *
     tlsphi_row_get(s, s->rows.PM, s->dim * s->dim, h->particle, PM);
     tlsphi_product(s->dim, PM, h->part.W, P);
 }
+/* The jump u - v_o by S and, with the other components of a mirror, times a column of B; arm: the same column of T^T. */
+static void tlsphi_held_jump(const tlsph_solver *s, const tlsphi_held_part *h, const tlsph_real *G, tlsph_real B,
+                             const tlsph_real *arm, tlsph_real *jump) {
+    const int dim = s->dim;
+    const tlsph_real *v = s->v + (size_t)dim * h->particle, deep = tlsphi_dot(dim, arm, h->N);
+    tlsph_real slope[3] = {0, 0, 0}, held[3] = {0, 0, 0};
+    for (int i = 0; i < dim; i++) jump[i] = (h->wanted[i] - v[i]) * B - tlsphi_dot(dim, G + dim * i, arm);
+    tlsphi_held_components(dim, h, jump);
+    if (!h->mirror) return;
+    tlsphi_multiply(dim, G, h->N, slope);
+    memcpy(held, slope, sizeof held);
+    tlsphi_held_components(dim, h, held);
+    for (int i = 0; i < dim; i++) jump[i] -= (slope[i] - held[i]) * deep;
+}
 /* Adds the jumps at the held parts [h, end) of one particle to its gradients, and their power to E. */
 static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tlsphi_held_part *end) {
     const int dim = s->dim;
@@ -4345,15 +4362,13 @@ static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tls
     tlsphi_stress_behind(s, h, P);
     for (; h != end; h++)
         for (size_t j = 0; j <= D; j++) { /* column j of S [...], at last the jump at the middle itself */
-            const tlsph_real B = j < D ? h->part.B[j] : 1, *arm = j < D ? h->part.T + D * j : h->part.o;
             tlsph_real column[3];
-            for (size_t i = 0; i < D; i++)
-                column[i] = (h->wanted[i] - s->v[D * a + i]) * B - tlsphi_dot(dim, G + D * i, arm);
-            tlsphi_held_components(dim, h, column);
+            if (j == D) tlsphi_held_jump(s, h, G, 1, h->part.o, h->jump);
+            if (j == D) tlsphi_held_components(dim, h, h->jump);
+            if (j == D) break;
+            tlsphi_held_jump(s, h, G, h->part.B[j], h->part.T + D * j, column);
             for (size_t i = 0; i < D; i++) {
                 const tlsph_real change = column[i] / s->V[a];
-                if (j == D) h->jump[i] = column[i];
-                if (j == D) continue;
                 grad[D * i + j] += change;
                 tlsphi_at(s, s->rows.grad_w, a)[(D * i + j) * TLSPHI_ROW] += change;
                 if (s->rate_E) s->rate_E[a] += P[D * i + j] * change;
@@ -4364,7 +4379,7 @@ static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tls
 static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *force, tlsph_real *Z) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, a = h->particle;
-    tlsph_real P[9], A[9], H[9], c[3], damping[3], wave[3], column[3];
+    tlsph_real P[9], A[9], H[9], c[3], damping[3], wave[3], column[3] = {0, 0, 0}, even[3], moment[9] = {0};
     tlsphi_stress_behind(s, h, P);
     tlsphi_row_get(s, s->rows.A, dim * dim, a, A);
     tlsphi_row_get(s, s->rows.wave, 3, a, wave);
@@ -4383,9 +4398,14 @@ static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_par
         tlsph_real arm[3] = {0, 0, 0};
         for (size_t i = 0; i < D; i++) arm[i] = h->part.T[D * i + j];
         tlsphi_multiply(dim, P, arm, column);
+        memcpy(even, column, sizeof even);
         tlsphi_held_components(dim, h, column);
-        for (size_t i = 0; i < D; i++) Z[D * i + j] = column[i] + damping[i] * h->part.o[j];
+        for (size_t i = 0; i < D; i++) {
+            Z[D * i + j] = column[i] + damping[i] * h->part.o[j];
+            for (size_t k = 0; h->mirror && k < D; k++) moment[D * i + k] += (even[i] - column[i]) * h->N[j] * h->N[k];
+        }
     }
+    for (size_t i = 0; i < D * D; i++) Z[i] += moment[i];
     for (size_t i = 0; i < D; i++) force[i] += damping[i];
     return tlsphi_dot(dim, damping, h->jump);
 }
@@ -7787,8 +7807,9 @@ static tlsph_result tlsphi_plan_conditions(tlsphi_plan *plan) {
         const tlsph_result r = tlsphi_check_condition(plan, d->conditions + k);
         if (r) return r;
         constraints += tlsphi_is_constraint(d->conditions[k].kind) ? 1 : 0;
-        if (d->mirror_gradients && (d->conditions[k].kind == TLSPH_ROLLER || d->conditions[k].kind == TLSPH_TANGENT))
-            plan->mirrors += tlsphi_set_size(plan, d->conditions + k);
+        const int mirror = d->mirror_gradients && (d->conditions[k].kind == TLSPH_ROLLER || d->conditions[k].kind == TLSPH_TANGENT);
+        for (size_t i = 0; mirror && i < tlsphi_set_size(plan, d->conditions + k); i++)
+            plan->mirrors += !tlsphi_owns_surface(d, tlsphi_set_host(d->conditions + k, i));
     }
     if (!constraints) return TLSPH_OK;
     plan->fixed = TLSPHI_SCRATCH(plan, uint8_t, plan->n);
@@ -8445,6 +8466,7 @@ static void tlsphi_fill_mirrors(tlsph_solver *s, const tlsphi_plan *plan) {
             tlsphi_unit_normal(c, s->dim, N);
             for (size_t i = 0; i < tlsphi_set_size(plan, c); i++) {
                 const uint32_t a = plan->inner[tlsphi_set_host(c, i)];
+                if (tlsphi_owns_surface(plan->desc, plan->host[a])) continue;
                 if (!pass) {
                     s->mirror_of[a]++;
                     continue;
@@ -8534,6 +8556,7 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
                 h->load = c->kind == TLSPH_VELOCITY ? load : TLSPHI_NONE;
                 h->item = (uint32_t)i;
                 h->along = c->kind == TLSPH_TANGENT ? -1 : c->kind != TLSPH_CLAMPED && tlsphi_dot(s->dim, c->normal, c->normal) > 0;
+                h->mirror = tlsphi_is_constraint(c->kind) && h->along && d->mirror_gradients;
                 if (h->along) tlsphi_unit_normal(c, s->dim, N);
                 for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
                 h->part = tlsphi_part_of(s, plan, c, a);
