@@ -2605,14 +2605,15 @@ static void tlsphi_closure_invert(size_t n, double *A) {
 }
 /* A uniform stress has no torque on a part where sum B (x) X + T = V I. What is missing for that goes into the lengths of its B,
    V n (n.(y_0 + Y X)): D (D + 1) equations A y = R a part. */
-typedef struct tlsphi_closure_turn { double A[144], y[12]; } tlsphi_closure_turn;
-/* y = A^-1 y; A may lack directions, for instance the turns of a ball. */
+typedef struct tlsphi_closure_turn { double A[144], y[12], V, MV; } tlsphi_closure_turn;
+/* y = A^-1 y; A may lack directions, for instance the turns of a ball. sum B (x) X = sum K, and behind surfaces sum B (x) X + T
+   = sum M K: it changes with the lengths of B by the mean of M as much. */
 static void tlsphi_closure_turn_solve(tlsphi_closure_turn *t, size_t N) {
     double y[12], most = 0;
     for (size_t k = 0; k < N; k++) most = tlsphi_dmax(most, t->A[(N + 1) * k]);
     for (size_t k = 0; k < N; k++) {
         t->A[(N + 1) * k] += 1e-12 * most;
-        y[k] = t->y[k];
+        y[k] = t->y[k] * (k % (N == 12 ? 4 : 3) ? t->V / t->MV : 1);
     }
     tlsphi_closure_invert(N, t->A);
     for (size_t k = 0; k < N; k++) {
@@ -2621,14 +2622,16 @@ static void tlsphi_closure_turn_solve(tlsphi_closure_turn *t, size_t N) {
     }
 }
 /* V I less the moment by which tractions act: T, or behind the surface T M K/V = (M - I) K, since loads are levered by the
-   particles' own gradients (see [SURFACES]); K = sum C (x) d / 2 of the solution, as it is in q. */
-static void tlsphi_closure_arms(const tlsphi_closer *c, size_t i, double A[9]) {
+   particles' own gradients (see [SURFACES]); K = sum C (x) d / 2 of the solution, as it is in q. Returns the mean of M's
+   diagonal. */
+static double tlsphi_closure_arms(const tlsphi_closer *c, size_t i, double A[9]) {
     const size_t D = c->rows - 1, a = c->plan->grid.order[i];
     const double V = tlsphi_plan_volume(c->plan, a), volume = pow(c->unit, (double)D);
-    double M[9] = {0};
+    double M[9] = {0}, mean = 0;
     tlsphi_closed_moment(c->plan, a, A);
-    if (!tlsphi_owns_surface(c->plan->desc, a)) return;
+    if (!tlsphi_owns_surface(c->plan->desc, a)) return 1;
     tlsphi_inverse((int)D, A, M);
+    for (size_t j = 0; j < D; j++) mean += V * M[(D + 1) * j] / (double)D;
     for (size_t j = 0; j < D; j++)
         for (size_t l = 0; l < D; l++) {
             A[3 * j + l] = j == l ? V : 0;
@@ -2637,6 +2640,7 @@ static void tlsphi_closure_arms(const tlsphi_closer *c, size_t i, double A[9]) {
                 A[3 * j + l] -= (V * M[D * j + k] - (j == k)) * (c->q[at] - c->slack[i][3] * c->x[at]) * volume / 2;
             }
         }
+    return mean;
 }
 /* Adds grid particle i to the equations of its part, around X0; or (apply) their solution to the residual. */
 static void tlsphi_closure_turn_add(tlsphi_closer *c, size_t i, const tlsph_real *X0, tlsphi_closure_turn *t, int apply) {
@@ -2651,7 +2655,8 @@ static void tlsphi_closure_turn_add(tlsphi_closer *c, size_t i, const tlsph_real
         for (size_t k = 0; k < 3; k++) c->r[4 * i + k] -= volume * along / nn * n[k];
     }
     if (apply) return;
-    tlsphi_closure_arms(c, i, A);
+    t->MV += volume * tlsphi_closure_arms(c, i, A);
+    t->V += volume;
     tlsphi_closure_slack(c->slack[i], c->x + 4 * rows * i, had);
     for (size_t k = 0; k < N; k++) {
         const size_t j = k / rows;
@@ -2698,7 +2703,7 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, i
     tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
     for (size_t i = 0; i < size; i++) c->r[i] = again ? 0 : tlsphi_closure_open(c, i / 4, i % 4);
     const tlsph_result turned = tlsphi_closure_turn_all(c, parent, &missing);
-    if (turned || (again && !(missing > TLSPHI_CLOSURE_BALANCE))) return turned;
+    if (turned || (again && !(missing > 10 * TLSPHI_CLOSURE_BALANCE))) return turned;
     packed.rows = 1;
     packed.x = c->p;
     packed.p = c->p + size;
@@ -2706,7 +2711,7 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, i
     memset(packed.x, 0, size * sizeof *packed.x);
     const tlsph_result r = tlsphi_closure_iterate(&packed, TLSPHI_CLOSURE_BALANCE, &residual);
     for (size_t i = 0; i < size; i++) c->x[c->rows * (i - i % 4) + i % 4] += packed.x[i];
-    return r || !c->plan->desc->particles.moments || again > 20 ? r : tlsphi_closure_balance(c, parent, again + 1);
+    return r || !c->plan->desc->particles.moments || again == 12 ? r : tlsphi_closure_balance(c, parent, again + 1);
 }
 
 /* V I - T of host particle a, padded to 3x3. */
@@ -9698,7 +9703,8 @@ TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *part
 
 #define TLSPHI_SHARP 0.85   /* cosine: edges that bend more are features */
 #define TLSPHI_RELAXATIONS 12
-#define TLSPHI_BEHIND 0.45  /* TLSPH_SCATTERED_INSIDE: least distance from the surface in spacings */
+#define TLSPHI_BEHIND 0.45  /* TLSPH_SCATTERED_INSIDE: distance of the first layer from the surface in spacings, */
+#define TLSPHI_BEHIND_LEAST 0.2 /* and the least, in corners */
 #define TLSPHI_LINES 4096   /* of a lattice, at most, per axis */
 
 /* splitmix64: the same jitter everywhere for the same seed. */
@@ -10270,7 +10276,7 @@ static tlsph_result tlsphi_sample_inside(tlsphi_sampler *s) {
                         const double h = tlsphi_local_spacing(s->fill, X);
                         const double share = varies ? (m->dim == 3 ? 0.87 : 0.83) : 0.5;
                         if (tlsphi_sample_near(s, X, share * h, tlsphi_sample_any, NULL)) continue;
-                        if (!(tlsphi_sample_distance(s, X) < -(inside ? TLSPHI_BEHIND : 0.5) * h)) continue;
+                        if (!(tlsphi_sample_distance(s, X) < -(inside ? TLSPHI_BEHIND_LEAST : 0.5) * h)) continue;
                         const tlsph_result r = tlsphi_sample_add(s, X, 2);
                         if (r) return r;
                     }
@@ -10289,9 +10295,16 @@ static int tlsphi_sample_push(tlsphi_sampler *s, size_t b, const double d[3], do
     for (int k = 0; k < 3; k++) push->move[k] += q * q * d[k] / r;
     return 0;
 }
+/* Moves a particle inside from X to Y, unless that comes near the surface: with all particles inside to what is then nearest. */
+static void tlsphi_sample_move(tlsphi_sampler *s, double X[3], double Y[3], double h) {
+    const int inside = s->fill->placement == TLSPH_SCATTERED_INSIDE;
+    double nearest[3], deep = tlsphi_sample_distance(s, Y);
+    if (inside && deep < 0 && deep > -TLSPHI_BEHIND * h && (deep = tlsphi_surface_distance(s, Y, nearest)) < 0)
+        for (int k = 0; k < 3; k++) Y[k] = nearest[k] - (Y[k] - nearest[k]) * TLSPHI_BEHIND * h / deep;
+    if (tlsphi_sample_distance(s, Y) < -(inside ? TLSPHI_BEHIND_LEAST : 0.4) * h) memcpy(X, Y, 3 * sizeof *X);
+}
 /* Particles push each other apart, one after the other: faces within the surface, the inside by less than reaches it. */
 static void tlsphi_sample_relax(tlsphi_sampler *s) {
-    const double behind = s->fill->placement == TLSPH_SCATTERED_INSIDE ? TLSPHI_BEHIND : 0.4;
     const size_t bins = s->bins[0] * s->bins[1] * s->bins[2];
     for (int pass = 0; pass < TLSPHI_RELAXATIONS; pass++) {
         for (size_t a = 0; a < s->count; a++) {
@@ -10305,7 +10318,7 @@ static void tlsphi_sample_relax(tlsphi_sampler *s) {
             const double size = sqrt(tlsphi_dot3(push.move, push.move)), step = tlsphi_dmin(0.3, 0.15 / (size + 1e-300)) * push.h;
             for (int k = 0; k < 3; k++) Y[k] = X[k] + (k < s->mesh.dim ? step * push.move[k] : 0);
             if (s->kind[a] == 1) tlsphi_surface_distance(s, Y, X);
-            else if (tlsphi_sample_distance(s, Y) < -behind * push.h) memcpy(X, Y, sizeof Y);
+            else tlsphi_sample_move(s, X, Y, push.h);
         }
         for (size_t b = 0; b < bins; b++) s->head[b] = TLSPHI_NONE;
         for (size_t a = 0; a < s->count; a++) tlsphi_sample_link(s, a);
