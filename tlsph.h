@@ -435,6 +435,9 @@ typedef struct tlsph_desc {
                                             keep their energy to a percent or two, where retries alone may miss all of
                                             it. Nothing is given up but time; counted in the ledger */
     int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
+    int keep_pairs;                      /* 1: tlsph_operator_view shows neighbours and vectors. Default 0: they are kept
+                                            only where the scene itself reads them pair by pair; in most, tiles of equal
+                                            patterns are all that is left of them, half of the memory at 26 neighbours */
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
     tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP, else serial */
     tlsph_allocator allocator;           /* zero: TLSPH_MALLOC and TLSPH_FREE */
@@ -599,8 +602,8 @@ typedef struct tlsph_operator {
     size_t count, pairs;
     int dimension;
     const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1 */
-    const uint32_t *neighbours;    /* b, solver's order */
-    const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric */
+    const uint32_t *neighbours;    /* b, solver's order; NULL where desc.keep_pairs is 0 */
+    const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric; NULL like these */
     const tlsph_real *correction;  /* M_a, dimension^2 each, or NULL */
     const tlsph_real *rests;       /* r_ab, `dimension` each, or NULL */
     const tlsph_real *volumes;     /* V_a */
@@ -3555,6 +3558,7 @@ struct tlsph_solver {
     int heat_moves; /* the fluxes hold conduction: conducts, but for the mechanical part of a split step */
     tlsphi_super super;
     int audit, projection, dissipation_heats, retries, threads, bonds;
+    int keeps_pairs;   /* `neighbour` and `g` are there; else only the graph of [TILES] */
     int turns;         /* the body's spin turns F exactly (tlsphi_turn_gradient) */
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
     int leaps;         /* TLSPH_LEAPFROG */
@@ -3574,7 +3578,7 @@ struct tlsph_solver {
     tlsph_real *beside; /* 2 a particle, NULL: one material; see tlsphi_fill_interfaces */
     /* operator */
     size_t *first;
-    uint32_t *neighbour;
+    uint32_t *neighbour; /* NULL without keeps_pairs, like g */
     tlsph_real *g, *M, *rest; /* rest: r_ab, see [BONDS] */
     size_t *damped_first; /* the pairs of the dissipation: the same arrays, but for TLSPH_CELLS_4 */
     uint32_t *damped_neighbour;
@@ -8161,6 +8165,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     }
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
+    s->keeps_pairs = d->keep_pairs || !s->lanes || s->sharp || s->incompressible || s->step_rule != TLSPH_STEP_BY_PARTICLE ||
+                     (s->conducts && d->conduction_stages);
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
 }
@@ -8288,11 +8294,12 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     const size_t before_pairs = arena->used;
     s->first = TLSPHI_TAKE(arena, size_t, n + 1);
     s->size.bytes_per_particle = (before_pairs - fixed + (n + 1) * sizeof(size_t)) / n;
-    s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
-    s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
-    s->damped_first = plan->lattice ? TLSPHI_TAKE(arena, size_t, n + 1) : s->first;
-    s->damped_neighbour = plan->lattice ? TLSPHI_TAKE(arena, uint32_t, plan->damped_pairs) : s->neighbour;
-    s->damped_g = plan->lattice ? TLSPHI_TAKE(arena, tlsph_real, D * plan->damped_pairs) : s->g;
+    if (s->keeps_pairs) s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
+    if (s->keeps_pairs) s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
+    const int apart = s->keeps_pairs && plan->lattice;
+    s->damped_first = apart ? TLSPHI_TAKE(arena, size_t, n + 1) : s->first;
+    s->damped_neighbour = apart ? TLSPHI_TAKE(arena, uint32_t, plan->damped_pairs) : s->neighbour;
+    s->damped_g = apart ? TLSPHI_TAKE(arena, tlsph_real, D * plan->damped_pairs) : s->g;
     s->image = TLSPHI_TAKE(arena, tlsphi_image, s->images);
     if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
@@ -8368,12 +8375,12 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         for (size_t i = 0; i < count; i++) {
             double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, middle[3], square = 0;
             tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, middle);
-            s->neighbour[start + i] = list[i];
+            if (s->keeps_pairs) s->neighbour[start + i] = list[i];
             for (size_t k = 0; k < D; k++) {
                 const double C = middle[k];
                 const int behind = plan->closed_C && s->M; /* there sum g is the area vector itself */
                 if (s->rest) s->rest[D * (start + i) + k] = (tlsph_real)(mine[k] - C);
-                s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
+                if (s->keeps_pairs) s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
                 B[k] -= behind ? g[D * i + k] : C;
                 square += mine[k] * mine[k];
             }
@@ -8395,11 +8402,11 @@ static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_
         tlsphi_stencil_of(plan, plan->host[a], &stencil);
         for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
         tlsphi_sort_pairs(s->dim, list, g, count);
-        for (size_t i = 0; i < count; i++, at++) {
+        for (size_t i = 0; s->keeps_pairs && i < count; i++, at++) {
             s->damped_neighbour[at] = list[i];
             for (size_t k = 0; k < D; k++) s->damped_g[D * at + k] = (tlsph_real)g[D * i + k];
         }
-        s->damped_first[a + 1] = at;
+        if (s->keeps_pairs) s->damped_first[a + 1] = at;
         s->tau[a] = (tlsph_real)(s->dim / (stencil.fineness[0] + stencil.fineness[1] + stencil.fineness[2]));
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)stencil.B[k];
         for (int i = 0; i < 6; i++) {
@@ -8433,12 +8440,13 @@ static void tlsphi_fill_laplacian(tlsph_solver *s) {
 }
 /* Where materials meet, a particle feels half of its neighbour's stiffness M = rho c_p^2 and conductivity with its own mass
    and heat capacity: it vibrates as if its sound were that of (M_a + M_b)/(2 rho_a). By this its step is shortened. */
-static void tlsphi_fill_interfaces(tlsph_solver *s) {
+static void tlsphi_fill_interfaces(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
     for (size_t a = 0; s->beside && a < s->n; a++) {
+        const size_t count = tlsphi_neighbours_of(plan, plan->host[a], list, g);
         const tlsphi_material *m = tlsphi_material_of(s, a);
         double stiffest = 1, h = (double)m->h;
-        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-            const tlsphi_material *other = tlsphi_material_of(s, s->neighbour[k]);
+        for (size_t i = 0; i < count; i++) {
+            const tlsphi_material *other = tlsphi_material_of(s, plan->inner[list[i]]);
             const double speeds = (double)(other->c_linear / m->c_linear);
             stiffest = tlsphi_dmax(stiffest, (1 + (double)(other->rho / m->rho) * speeds * speeds) / 2);
             h = tlsphi_dmax(h, (double)(m->h + other->h) / 2);
@@ -8646,7 +8654,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     tlsphi_fill_pairs(s, plan, list, g);
     tlsphi_fill_fourth(s, plan, list, g);
     tlsphi_fill_laplacian(s);
-    tlsphi_fill_interfaces(s);
+    tlsphi_fill_interfaces(s, plan, list, g);
     tlsphi_fill_fixes(s, plan);
     tlsphi_fill_mirrors(s, plan);
     tlsphi_fill_turns(s);
@@ -10444,11 +10452,13 @@ static void tlsphi_hint(tlsph_preflight_report *r, tlsph_hint hint, int holds) {
     if (holds) r->hints |= 1u << hint;
 }
 /* How evenly the neighbours of a lie around it: dim times the least eigenvalue of sum |C| e (x) e / sum |C|, e = C/|C|. */
-static double tlsphi_evenness(const tlsph_solver *s, size_t a) {
+static double tlsphi_evenness(const tlsph_solver *s, size_t tile, size_t a) {
+    const tlsphi_graph *graph = &s->graph;
     double K[9] = {0}, Q[9], sum = 0;
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        double C[3];
-        tlsphi_vector3(s->g + (size_t)s->dim * k, s->dim, C);
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const size_t at = (size_t)graph->slot[k].pattern * (size_t)graph->width * TLSPHI_LANES + a % TLSPHI_LANES;
+        double C[3] = {0, 0, 0};
+        for (int i = 0; i < s->dim; i++) C[i] = (double)graph->pattern[at + (size_t)i * TLSPHI_LANES];
         const double length = sqrt(tlsphi_norm2(C));
         for (int i = 0; i < 9 && length > 0; i++) K[i] += C[i / 3] * C[i % 3] / length;
         sum += length;
@@ -10472,8 +10482,10 @@ static int tlsphi_is_irregular(const tlsph_solver *s) {
 static double tlsphi_survey_particles(const tlsph_solver *s, tlsph_preflight_report *r) {
     double sound_step = TLSPHI_LARGEST;
     r->support = r->spacing_least = TLSPHI_LARGEST;
-    for (size_t a = 0; a < s->n; a++) {
-        const double even = tlsphi_evenness(s, a), tau = (double)s->tau[a];
+    for (size_t a = 0, block = 0, tile = 0; a < s->n; a++) {
+        block += a == s->block[block].end;
+        tile += a > 0 && (a % TLSPHI_LANES == 0 || a == s->block[block].begin);
+        const double even = tlsphi_evenness(s, tile, a), tau = (double)s->tau[a];
         if (even < r->support) {
             r->support = even;
             r->weakest = s->host[a];

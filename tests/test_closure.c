@@ -23,6 +23,7 @@ static tlsph_desc closed_desc(int dimension, const tlsph_particles *particles, c
     desc.operator_kind = TLSPH_CLOSED;
     desc.kernel = TLSPH_WENDLAND_C2;
     desc.support = R(0.825);
+    desc.keep_pairs = 1;
     desc.threads = 1;
     return desc;
 }

@@ -14,6 +14,7 @@ static int small_make(small *s, int dimension)
     if (!CHECK(own_box(&s->cloud, dimension, cells, 0.25, 0))) return 0;
     s->material = soft_material(TLSPH_NEO_HOOKEAN);
     s->desc = tlsph_desc_default(dimension);
+    s->desc.keep_pairs = 1;
     s->desc.particles = s->cloud.particles;
     s->desc.materials = &s->material;
     s->desc.material_count = 1;

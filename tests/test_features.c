@@ -22,6 +22,7 @@ static int body_make(body *b, int dimension, int nx, int ny, int nz) {
     if (!CHECK(own_box(&b->cloud, dimension, cells, 0.25, 0))) return 0;
     b->materials[0] = b->materials[1] = soft_material(TLSPH_NEO_HOOKEAN);
     b->desc = tlsph_desc_default(dimension);
+    b->desc.keep_pairs = 1;
     b->desc.particles = b->cloud.particles;
     b->desc.materials = b->materials;
     b->desc.material_count = 1;

@@ -99,6 +99,49 @@ TEST(leanest_scene_is_lean)
     CHECK(bytes <= 60 * sizeof(tlsph_real));
 }
 
+/* What keeping the pairs costs, and that nothing else depends on it: neither states nor the survey before the run. */
+TEST(pairs_are_kept_on_request)
+{
+    for (int k = 0; k < 2; k++) {
+        plain_scene s;
+        tlsph_solver *solver[2] = {NULL, NULL};
+        tlsph_operator view[2];
+        tlsph_size size[2];
+        tlsph_preflight_report report[2];
+        REQUIRE(plain_scene_make(&s, 3, TLSPH_PF, TLSPH_ISOTHERMAL));
+        if (k) s.desc.support = R(0.9);
+        for (int i = 0; i < 2; i++) {
+            s.desc.keep_pairs = i;
+            REQUIRE_OK(tlsph_create(&s.desc, &solver[i], NULL));
+            tlsph_operator_view(solver[i], &view[i]);
+            tlsph_size_read(solver[i], &size[i]);
+            tlsph_preflight(solver[i], 1, &report[i]);
+            for (int step = 0; step < 3; step++) REQUIRE_OK(tlsph_step(solver[i], R(1)));
+        }
+        CHECK(!view[0].neighbours && !view[0].vectors && view[1].neighbours && view[1].vectors);
+        CHECK_SAME(view[0].first[view[0].count], view[1].first[view[1].count]);
+        CHECK(size[1].bytes - size[0].bytes >= size[0].pairs * (4 + 3 * sizeof(tlsph_real)));
+        CHECK(report[0].support > 0 && report[0].support < 1);
+        double least = 1; /* the same from the pairs: the least eigenvalue of sum |C| e e is at most each of its diagonal */
+        for (size_t a = 0; a < view[1].count; a++) {
+            double K[3] = {0, 0, 0}, sum = 0;
+            for (size_t p = view[1].first[a]; p < view[1].first[a + 1]; p++) {
+                const tlsph_real *C = view[1].vectors + 3 * p;
+                const double length = sqrt((double)(C[0] * C[0] + C[1] * C[1] + C[2] * C[2]));
+                for (int i = 0; i < 3 && length > 0; i++) K[i] += (double)(C[i] * C[i]) / length;
+                sum += length;
+            }
+            least = fmin(least, 3 * fmin(K[0], fmin(K[1], K[2])) / sum);
+        }
+        for (int i = 0; i < 2; i++) CHECK_BELOW(report[i].support, least * (1 + 1e-5));
+        CHECK(report[0].support == report[1].support && report[0].weakest == report[1].weakest);
+        if (k == 0) CHECK_CLOSE(report[0].support, least, 1e-5); /* axis pairs only: the diagonal is all */
+        CHECK(state_hash(solver[0]) == state_hash(solver[1]));
+        for (int i = 0; i < 2; i++) tlsph_destroy(solver[i]);
+        own_cloud_destroy(&s.cloud);
+    }
+}
+
 TEST(measured_size_is_the_size_taken)
 {
     int u, t;
@@ -366,6 +409,7 @@ static tlsph_result make_cloud(const void *what, const tlsph_allocator *allocato
 static int own_pairs(tlsph_desc *lattice, tlsph_particles *out)
 {
     lattice->operator_kind = TLSPH_CELLS;
+    lattice->keep_pairs = 1;
     tlsph_solver *solver = NULL;
     tlsph_operator view;
     if (!CHECK_RESULT(tlsph_create(lattice, &solver, NULL), TLSPH_OK)) return 0;
@@ -587,7 +631,7 @@ TEST(destroying_nothing)
 }
 
 SUITE(memory, ENTRY(every_unknown_adds_bytes), ENTRY(heat_adds_bytes), ENTRY(two_dimensions_need_less),
-      ENTRY(leanest_scene_is_lean), ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
+      ENTRY(leanest_scene_is_lean), ENTRY(pairs_are_kept_on_request), ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
       ENTRY(field_table), ENTRY(callers_memory_is_used), ENTRY(callers_memory_too_small),
       ENTRY(failing_allocations_leak_nothing), ENTRY(failing_allocations_in_measure),
       ENTRY(failing_allocations_of_every_operator), ENTRY(failing_allocations_of_clouds),

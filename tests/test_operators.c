@@ -37,6 +37,7 @@ static tlsph_solver *make(const setup *s, own_cloud *cloud)
     desc.operator_kind = s->kind;
     desc.support = R(s->support);
     desc.threads = 1;
+    desc.keep_pairs = 1;
     if (!CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_OK)) printf("    %s\n", error.message);
     return solver;
 }
@@ -349,6 +350,7 @@ static tlsph_solver *make_given(const own_cloud *cloud, const tlsph_operator *vi
     desc.particles.neighbours = neighbours;
     desc.particles.pair_vectors = C;
     desc.operator_kind = TLSPH_GIVEN;
+    desc.keep_pairs = 1;
     desc.materials = &m;
     desc.material_count = 1;
     CHECK_RESULT(tlsph_create(&desc, &solver, error), TLSPH_OK);

@@ -16,6 +16,7 @@ static tlsph_solver *box(int dimension, double jitter, tlsph_cloud *cloud) {
     desc.materials = &material;
     desc.material_count = 1;
     if (jitter > 0) desc.support = R(0.9);
+    desc.keep_pairs = 1;
     CHECK_RESULT(tlsph_create(&desc, &solver, NULL), TLSPH_OK);
     return solver;
 }

@@ -254,6 +254,7 @@ static tlsph_result create_solver(scene_setup *setup, const scene_options *optio
     tlsph_desc desc = tlsph_desc_default(dimension);
     scene_options_apply(options, &desc);
     desc.particles = setup->body.cloud.particles;
+    desc.keep_pairs = 1; /* scene_oscillation and scene_alternation look at neighbours */
     desc.materials = &setup->body.material;
     desc.material_count = 1;
     desc.conditions = setup->conditions;
