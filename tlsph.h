@@ -8166,7 +8166,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
     s->keeps_pairs = d->keep_pairs || !s->lanes || s->sharp || s->incompressible || s->step_rule != TLSPH_STEP_BY_PARTICLE ||
-                     (s->conducts && d->conduction_stages);
+                     (s->conducts && d->conduction_stages) || d->particles.moments;
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
 }
