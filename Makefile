@@ -29,7 +29,7 @@ SHARED := $(wildcard examples/common/*.c examples/scenes/*.c) tests/implementati
 TESTS := $(filter-out tests/implementation.c tests/fuzz.c tests/extremes.c,$(wildcard tests/*.c))
 TOPICS := $(patsubst tests/test_%.c,%,$(wildcard tests/test_*.c))
 BENCHES := $(wildcard bench/*.c)
-BENCH_PROGRAMS := $(addprefix build/,bench textbook scaling scaling_float study study_float)
+BENCH_PROGRAMS := $(addprefix build/,bench multirate textbook scaling scaling_float study study_float)
 
 all: $(EXAMPLES)
 	@echo "examples are in build/ (each tells its options with --help)"
@@ -78,7 +78,8 @@ $(eval $(call flavour,coverage,-O0 -g --coverage -Dalways_inline=unused,-O0))
 $(EXAMPLES): build/%: build/obj/double/examples/%.o build/obj/double/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 
-build/bench build/textbook build/scaling: build/%: build/obj/double/bench/%.o build/obj/double/bench/machine.o build/obj/double/shared.a
+build/bench build/multirate build/textbook build/scaling: build/%: build/obj/double/bench/%.o \
+    build/obj/double/bench/machine.o build/obj/double/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 build/scaling_float: build/obj/float/bench/scaling.o build/obj/float/bench/machine.o build/obj/float/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
@@ -90,6 +91,7 @@ build/study_float: build/obj/float/bench/study.o build/obj/float/bench/runs.o bu
 bench bench-full: $(BENCH_PROGRAMS)
 	build/bench $(if $(filter bench,$@),--quick)
 	build/textbook
+	build/multirate $(if $(filter bench,$@),--quick)
 	build/scaling $(if $(filter bench,$@),--quick)
 	build/scaling_float --memory
 	sh bench/study.sh $(if $(filter bench,$@),400,5400 --full)

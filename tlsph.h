@@ -61,8 +61,8 @@ PROMISES
 INDEX (search for the tag)
   [API-TYPES] [API-FUNCTIONS] [API-END] [METHOD] [SHIMS] [TENSORS] [KERNELS] [NEIGHBOURS] [OPERATORS] [BONDS]
   [CLOSURE] [MATERIALS] [PLASTICITY] [SOLVER-DATA] [EVALUATION] [PAIR-STEP] [DISSIPATION] [SURFACES] [GRADIENTS] [JST]
-  [FLUXES] [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEAPFROG] [ALGORITHM] [LEDGER]
-  [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [TILES] [SELF-TEST] [PREFLIGHT] [VORONOI] [SHAPES] [FILL]
+  [FLUXES] [CONDITIONS] [PROJECTION] [RHS] [INCOMPRESSIBLE] [SUPER-STEPS] [STEP] [LEAPFROG] [MULTI-RATE] [ALGORITHM]
+  [LEDGER] [FIELDS] [CHECKPOINT] [VALIDATION] [CREATION] [TILES] [SELF-TEST] [PREFLIGHT] [VORONOI] [SHAPES] [FILL]
   [REPRODUCING] [LICENCE]
 */
 #ifndef TLSPH_H
@@ -421,6 +421,12 @@ typedef struct tlsph_desc {
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
     int projection;                      /* 1: keeps angular momentum (000-79 to 82); default 1. 0: [PROJECTION] */
     tlsph_integrator integrator;         /* default TLSPH_RK2 */
+    int rates;                           /* with TLSPH_LEAPFROG: largest number of step sizes, dt, dt/2, dt/4 ..., that
+                                            stiff and fine parts may take for themselves; default 1, at most 8. Chosen
+                                            once, for the undeformed body; time and stable step are those of the whole.
+                                            Momenta stay exact, errors are those of the longest step, see [MULTI-RATE].
+                                            Isothermal; without driven velocities, walls, plastic flow, sharp gradients,
+                                            TLSPH_CELLS_4 and the forms that are for comparison only */
     tlsph_scheme scheme;                 /* default TLSPH_EXPLICIT */
     tlsph_incompressible incompressible; /* for TLSPH_INCOMPRESSIBLE */
     tlsph_real cfl;                      /* alpha_CFL of (000-78), default 0.3; in (0, 1], see tlsph_cfl_limit */
@@ -451,6 +457,7 @@ typedef struct tlsph_size {
     size_t bytes_per_pair;
     size_t pairs;              /* directed neighbour pairs */
     size_t neighbours_least, neighbours_most;
+    int rates;                 /* step sizes that differ, 1 to desc.rates */
 } tlsph_size;
 
 /* What TLSPH_CLOSED took to make and how well it holds (see tlsph_closure_read). */
@@ -1450,6 +1457,9 @@ typedef struct tlsphi_plan {
     int antisymmetric;      /* C_ab = -C_ba to round-off: the solver stores C itself */
     uint32_t *host, *inner; /* solver order -> host number, and back */
     uint32_t *body;         /* of each particle in solver order */
+    uint8_t *level, *seen;  /* [MULTI-RATE], host order, NULL: off; bit l: a neighbour has another level l */
+    double *lightest;       /* and root of the least density of the neighbours over the particle's own, at most 1 */
+    int levels;
     size_t bodies, blocks;
     tlsphi_graph graph[2];   /* of all pairs; of those of the dissipation, where they are others. See [TILES] */
     uint8_t *fixed;          /* number of constrained directions of each particle (solver order), */
@@ -2399,10 +2409,15 @@ static uint32_t *tlsphi_order_rows(tlsphi_plan *plan, uint32_t *list, double *g)
     tlsphi_radix_sort(key, order, key2, order2, n);
     return order;
 }
+/* 2 level + 1 beside another level; particles of a class stand together. */
+static size_t tlsphi_rate_class(const tlsphi_plan *plan, size_t host) {
+    return plan->level ? 2 * (size_t)plan->level[host] + (plan->seen[host] != 0) : 0;
+}
 /* Bodies get numbers in the order of their first particle; particles are ordered by body, then by rows. */
 static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent, uint32_t *list, double *g) {
     const size_t n = plan->n;
-    size_t *start = TLSPHI_SCRATCH(plan, size_t, n + 2);
+    const size_t classes = plan->level ? 2 * (size_t)plan->levels : 1;
+    size_t *start = TLSPHI_SCRATCH(plan, size_t, classes * n + 2);
     uint32_t *label = TLSPHI_SCRATCH(plan, uint32_t, n);
     plan->host = TLSPHI_SCRATCH(plan, uint32_t, n);
     plan->inner = TLSPHI_SCRATCH(plan, uint32_t, n);
@@ -2413,12 +2428,12 @@ static tlsph_result tlsphi_order(tlsphi_plan *plan, uint32_t *parent, uint32_t *
     for (size_t a = 0; a < n; a++) { /* roots are the smallest numbers of their bodies, so they come first */
         const uint32_t root = tlsphi_root(parent, (uint32_t)a);
         label[a] = root == a ? (uint32_t)plan->bodies++ : label[root];
-        start[label[a] + 2]++;
+        start[classes * label[a] + tlsphi_rate_class(plan, a) + 2]++;
     }
-    for (size_t b = 0; b < plan->bodies; b++) start[b + 2] += start[b + 1];
+    for (size_t b = 0; b < classes * plan->bodies; b++) start[b + 2] += start[b + 1];
     for (size_t i = 0; i < n; i++) {
         const uint32_t a = order[i];
-        const size_t at = start[label[a] + 1]++;
+        const size_t at = start[classes * label[a] + tlsphi_rate_class(plan, a) + 1]++;
         plan->host[at] = a;
         plan->inner[a] = (uint32_t)at;
         plan->body[at] = label[a];
@@ -3473,6 +3488,8 @@ enum { TLSPHI_MOMENTS = 16 }; /* sums of the projection, see [PROJECTION] */
 typedef struct tlsphi_block {
     uint32_t begin, end, body;
     uint32_t tile; /* its first, in a graph */
+    int level, seen; /* [MULTI-RATE]; bit l: some neighbours have another level l */
+    double reached;  /* the time of its x there */
     uint32_t failed; /* first bad particle of the block, or TLSPHI_NONE */
     tlsph_result failure;
     double time_step, heat_step; /* stable step of its particles, s; of conduction alone, where that is split off */
@@ -3531,6 +3548,7 @@ typedef struct tlsphi_body {
     int closed;                           /* incompressible: its whole surface is held, so that the mean pressure is free */
     double shift;
     double debt[3];                       /* torque that earlier stages owe to the step, see [PROJECTION] */
+    double owed[6], from[3];              /* [MULTI-RATE]: resultant and torque of all passes; centre at first */
 } tlsphi_body;
 
 /* Work arrays of [INCOMPRESSIBLE]. */
@@ -3553,6 +3571,19 @@ typedef struct tlsphi_super {
     tlsph_real *first, *previous, *current, *rate, *source, *E;
 } tlsphi_super;
 
+/* See [MULTI-RATE]. */
+typedef struct tlsphi_rates {
+    int levels;              /* 1: off, no arrays */
+    uint8_t *of;             /* level of each particle */
+    uint32_t *list;          /* blocks of level l from first[2 l], others with neighbours in it from first[2 l + 1] */
+    size_t first[17];
+    tlsph_real *was;         /* x when each level was moved last, n D a level, and */
+    double last[8];          /* when that was, since the beginning of the step */
+    int level;               /* of the pass, */
+    double time, step;       /* its time since then, step, */
+    tlsph_real elapsed;      /* and time since last */
+} tlsphi_rates;
+
 struct tlsph_solver {
     int dim, thermal, linear, has_H, has_J, sharp, corrected, conducts, has_user, has_plastic, metal;
     int heat_moves; /* the fluxes hold conduction: conducts, but for the mechanical part of a split step */
@@ -3562,6 +3593,7 @@ struct tlsph_solver {
     int turns;         /* the body's spin turns F exactly (tlsphi_turn_gradient) */
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
     int leaps;         /* TLSPH_LEAPFROG */
+    tlsphi_rates rates;
     int parted;        /* stresses and dissipation are gathered apart: frozen, or over different pairs */
     tlsph_integrator integrator;
     tlsph_dissipation dissipation;
@@ -5212,6 +5244,17 @@ TLSPHI_INLINE void tlsphi_add_lanes(const int dim, const tlsphi_lane_sums *flux,
         sum->production[l] += flux->production[l];
     }
 }
+/* The vectors of a slot without the pairs whose dissipation belongs to another pass, see [MULTI-RATE]. */
+static const tlsph_real *tlsphi_mask_slot(const tlsph_solver *s, const tlsphi_graph *graph, const tlsphi_slot *slot,
+                                          size_t base, int dim, const tlsph_real *g, tlsph_real *out) {
+    for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const size_t a = base + l, b = slot->scattered ? graph->gathered[slot->from + l] : slot->from + l;
+        const int level_a = a < s->n ? s->rates.of[a] : 0, level_b = b < s->n ? s->rates.of[b] : 0;
+        const int in = (level_a > level_b ? level_a : level_b) == s->rates.level;
+        for (size_t i = 0; i <= (size_t)dim; i++) out[i * TLSPHI_LANES + l] = in ? g[i * TLSPHI_LANES + l] : 0;
+    }
+    return out;
+}
 TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
                                      const int dim, const int with_J, int parts, tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
@@ -5228,6 +5271,8 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         else if (heats && s->M) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 1, sum);
         else if (heats) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 0, sum);
         if (!damps) continue;
+        tlsph_real masked[4 * TLSPHI_LANES_MOST];
+        if (block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
         tlsphi_lane_sums flux;
         if (s->dissipation == TLSPH_FIRST_ORDER)
             tlsphi_damp_lanes(&r, a, b, g, dim, with_J, TLSPH_FIRST_ORDER, 0, s->jump_share, &flux);
@@ -5617,9 +5662,10 @@ static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage 
     }
 }
 
-static void tlsphi_apply_fixes(tlsph_solver *s) {
+/* Takes the fixed directions out of momenta, or of their rates. */
+static void tlsphi_apply_fixes(const tlsph_solver *s, tlsph_real *momenta) {
     for (size_t i = 0; i < s->fixes; i++) {
-        tlsph_real *p = s->now.p + (size_t)s->dim * s->fix[i].particle;
+        tlsph_real *p = momenta + (size_t)s->dim * s->fix[i].particle;
         const tlsph_real along = tlsphi_dot(s->dim, p, s->fix[i].e);
         for (int k = 0; k < s->dim; k++) p[k] -= along * s->fix[i].e[k];
     }
@@ -5687,7 +5733,7 @@ static void tlsphi_constrain(tlsph_solver *s, const tlsphi_stage *stage, double 
     const double time = s->time + stage->end * dt;
     for (size_t i = 0; i < s->loads; i++)
         if (s->load[i].given.kind == TLSPH_VELOCITY) tlsphi_drive(s, s->load + i, stage, time);
-    tlsphi_apply_fixes(s);
+    tlsphi_apply_fixes(s, s->now.p);
     for (size_t i = 0; i < s->loads; i++)
         if (s->load[i].given.kind == TLSPH_WALL) tlsphi_apply_wall(s, s->load + i, stage, dt);
 }
@@ -6975,6 +7021,265 @@ static const tlsphi_block *tlsphi_leap(tlsph_solver *s, const tlsphi_stage *stag
     return tlsphi_evaluate(s);
 }
 
+/* ==== [MULTI-RATE] =================================================================================================
+   Where stiff or fine parts set the step, `desc.rates` lets them take it alone. A particle of level l moves its F by
+   steps of dt/2^l, with kicks in their middle: its stress pushes it and its neighbours at once, so that each impulse is
+   without resultant, and without torque but for what the projection takes away. In between momenta are constant, and
+   one who is asked seldom sees the way that its neighbours have gone meanwhile:
+     F(t) = F(t') + grad (x(t) - x(t')),   H and J by the differences of cof F and det F.
+   The passes S_l(dt) = S_{l+1}(dt/2) K_l(dt) S_{l+1}(dt/2) are symmetric in time, as are asynchronous variational
+   integrators (Lew, Marsden, Ortiz and West, Int. J. Numer. Meth. Engrg. 60 (2004) 153) and the impulse method of
+   molecular dynamics. The dissipation of a pair goes with the finer of the two. A pass takes its level and, for the
+   forces, those with neighbours in it; levels, and of them the particles beside others, have blocks of their own.
+   Levels are chosen at creation, from each particle's stable step and so that a second costs least; what stiffens later
+   shortens the whole step. Where all have the same level, this is the plain leapfrog, bitwise.
+   What it gives up: errors are those of the whole step, of second order and by the dissipation of first; dissipation
+   between parts reconstructs with slopes up to a step old. Momenta are exact, the energy balance is of second order
+   (TLSPH_ENERGY, which promises more, is refused). Slow parts push once per whole step, so that waves in the fast ones
+   with periods near twice that might resonate; ratios of speeds from 1.7 to 12 did not, on noise, to the CFL limit. */
+
+/* Runs fn for blocks of the pass's level: its own, those with neighbours in it, or both. */
+enum { TLSPHI_OWN, TLSPHI_TOUCHED, TLSPHI_ALL };
+typedef struct tlsphi_pass {
+    tlsph_solver *s;
+    const uint32_t *list;
+    tlsphi_block_fn fn;
+} tlsphi_pass;
+static void tlsphi_pass_task(void *arg, size_t i) {
+    const tlsphi_pass *pass = (const tlsphi_pass *)arg;
+    pass->fn(pass->s, pass->s->block + pass->list[i]);
+}
+static void tlsphi_run_level(tlsph_solver *s, tlsphi_block_fn fn, int which) {
+    const size_t *first = s->rates.first + 2 * s->rates.level;
+    const size_t begin = first[which == TLSPHI_TOUCHED], end = first[which == TLSPHI_OWN ? 1 : 2];
+    tlsphi_pass pass;
+    pass.s = s;
+    pass.list = s->rates.list + begin;
+    pass.fn = fn;
+    tlsphi_parallel(s->run, s->run_user, s->threads, tlsphi_pass_task, &pass, end - begin);
+}
+/* Where the pass sees a particle; linear elasticity takes moments about X. */
+static void tlsphi_pass_position(const tlsph_solver *s, size_t a, double x[3]) {
+    tlsphi_vector3((s->linear ? s->X : s->now.x) + (size_t)s->dim * a, s->dim, x);
+}
+/* Moves x to the time of the pass. The rows of v become mean velocities since the level was moved last, those of w the
+   same without the rigid motion that the body had when the step began. */
+static void tlsphi_view_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim;
+    const tlsphi_rates *rates = &s->rates;
+    const tlsphi_body *body = s->body + block->body;
+    const tlsph_real dt = (tlsph_real)(rates->time - block->reached), per = 1 / rates->elapsed;
+    tlsph_real *was = rates->was + (size_t)rates->level * D * s->n, v[3];
+    for (size_t a = block->begin; a < block->end; a++) {
+        const tlsph_real move = dt / tlsphi_material_of(s, a)->rho;
+        double arm[3] = {0, 0, 0}, turn[3];
+        for (size_t k = 0, at = D * a; k < D; k++, at++) {
+            s->now.x[at] += move * s->now.p[at];
+            v[k] = (s->now.x[at] - was[at]) * per;
+            was[at] = s->now.x[at];
+        }
+        tlsphi_row_put(s, s->rows.v, s->dim, a, v);
+        tlsphi_pass_position(s, a, arm);
+        for (int k = 0; k < 3; k++) arm[k] -= body->from[k] + (s->linear ? 0 : rates->time * body->v_mean[k]);
+        tlsphi_cross3(body->spin, arm, turn);
+        for (size_t k = 0; s->projection && k < D; k++) v[k] -= (tlsph_real)(body->v_mean[k] + turn[k]);
+        tlsphi_row_put(s, s->rows.w, s->dim, a, v);
+        if (s->rate_J) s->rate_J[a] = 0;
+    }
+    block->reached = rates->time;
+}
+/* F, H and J by grad v; H and J with F of the middle, which is exact but for det(change) in J. */
+static void tlsphi_deform_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim, dd = D * D;
+    const tlsph_real dt = s->rates.elapsed;
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsph_real *F = s->now.F + dd * a, *G = s->rate_F + dd * a, old[9], rate[9], H[9], in_plane[9];
+        for (size_t j = 0; s->turns && j < D; j++) { /* G has spin x F in it: make it that of the middle */
+            double column[3] = {0, 0, 0}, turn[3];
+            for (size_t i = 0; i < D; i++) column[i] = (double)G[D * i + j];
+            tlsphi_cross3(s->body[block->body].spin, column, turn);
+            for (size_t i = 0; i < D; i++) G[D * i + j] += dt / 2 * (tlsph_real)turn[i];
+        }
+        tlsphi_expand(s->dim, F, 1, old);
+        tlsphi_expand(s->dim, G, 0, rate);
+        if (s->has_J) {
+            tlsphi_cross_inline(old, rate, H);
+            const int linear = tlsphi_material_of(s, a)->kind == TLSPH_LINEAR;
+            s->now.J[a] += dt * (s->rate_J[a] + (linear ? 0 : dt / 2 * tlsphi_dot(9, H, rate)));
+            s->rate_J[a] = 0;
+        }
+        if (s->has_H) {
+            for (int i = 0; i < 9; i++) old[i] += dt / 2 * rate[i];
+            tlsphi_cross_inline(old, rate, H);
+            tlsphi_shrink(s->dim, H, in_plane);
+            for (size_t i = 0; i < dd; i++) s->now.H[dd * a + i] += dt * in_plane[i];
+        }
+        for (size_t i = 0; i < dd; i++) F[i] += dt * G[i];
+    }
+}
+/* A pass sees no stresses but those of its own level: they act once and go. */
+static void tlsphi_hide_stress(tlsph_solver *s, tlsphi_block *block) {
+    for (int i = 0; i < s->dim * s->dim; i++)
+        memset(tlsphi_at(s, s->rows.P + i, block->begin), 0, (block->end - block->begin) * sizeof *s->row);
+}
+/* Resultant and torque of the pass's rates. */
+static void tlsphi_torque_block(tlsph_solver *s, tlsphi_block *block) {
+    double x[3], T[3], torque[3];
+    memset(block->moments, 0, sizeof block->moments);
+    for (size_t a = block->begin; a < block->end; a++) {
+        tlsphi_pass_position(s, a, x);
+        tlsphi_vector3(s->rate_p + (size_t)s->dim * a, s->dim, T);
+        tlsphi_cross3(x, T, torque);
+        for (int k = 0; k < 3; k++) block->moments[k] += (double)s->V[a] * T[k];
+        for (int k = 0; k < 3; k++) block->moments[3 + k] += (double)s->V[a] * torque[k];
+    }
+}
+/* p and J by the rates of the pass; what the dissipation took, at the mean of v before and after. */
+static void tlsphi_push_block(tlsph_solver *s, tlsphi_block *block) {
+    const size_t D = (size_t)s->dim;
+    const tlsph_real dt = (tlsph_real)s->rates.step;
+    for (size_t a = block->begin; a < block->end; a++) {
+        const tlsph_real *held = s->held + (D + 2) * a, *rate = s->rate_p + D * a;
+        const tlsph_real per_rho = 1 / tlsphi_material_of(s, a)->rho;
+        tlsph_real heat = held[D], *p = s->now.p + D * a;
+        for (size_t k = 0; k < D; k++) {
+            heat -= (p[k] + dt / 2 * rate[k]) * per_rho * held[k];
+            p[k] += dt * rate[k];
+        }
+        if (s->rate_J) s->now.J[a] += dt * s->rate_J[a];
+        block->sums[TLSPHI_SUM_DISSIPATION] += (double)heat;
+    }
+    tlsphi_hide_stress(s, block);
+}
+/* A load on a particle of the level: into the rates, or, `done`, its work at the mean of v before and after. */
+static void tlsphi_load_particle(tlsph_solver *s, const tlsphi_load *load, size_t i, int done) {
+    const size_t D = (size_t)s->dim, a = load->inner[i];
+    const double dt = s->rates.step;
+    const tlsph_real *p = s->now.p + D * a, half = (tlsph_real)(dt / 2), per_rho = 1 / tlsphi_material_of(s, a)->rho;
+    tlsph_real force[3] = {0, 0, 0}, *rate = s->rate_p + D * a;
+    double x[3], f[3], turn[3];
+    tlsphi_load_force(s, load, i, force);
+    for (size_t k = 0; k < D; k++) {
+        if (done) s->account.external_work += dt * (double)(force[k] * (p[k] - half * rate[k]) * per_rho);
+        else rate[k] += force[k] / s->V[a];
+    }
+    if (!done) return;
+    tlsphi_pass_position(s, a, x);
+    tlsphi_vector3(force, s->dim, f);
+    tlsphi_cross3(x, f, turn);
+    for (int k = 0; k < 3; k++) s->account.impulse[k] += dt * f[k];
+    for (int k = 0; k < 3; k++) s->account.angular_impulse[k] += dt * turn[k];
+}
+static void tlsphi_load_level(tlsph_solver *s, int done) {
+    for (size_t i = 0; i < s->loads; i++) {
+        tlsphi_load *load = s->load + i;
+        if (load->given.values && !done) tlsphi_load_values(s, load, s->time + s->rates.time);
+        for (size_t k = 0; k < load->given.count; k++)
+            if (s->rates.of[load->inner[k]] == s->rates.level) tlsphi_load_particle(s, load, k, done);
+    }
+}
+/* Moves F, H, J of a level to `time`, since the beginning of the step. */
+static void tlsphi_move_level(tlsph_solver *s, int level, double time) {
+    tlsphi_rates *rates = &s->rates;
+    rates->level = level;
+    rates->time = time;
+    rates->elapsed = (tlsph_real)(time - rates->last[level]);
+    rates->last[level] = time;
+    tlsphi_run_level(s, tlsphi_view_block, TLSPHI_ALL);
+    tlsphi_run_level(s, tlsphi_gradient_block, TLSPHI_OWN);
+    tlsphi_run_level(s, tlsphi_deform_block, TLSPHI_OWN);
+}
+/* One pass: the impulse of a level's stresses over `step`. Returns the first failed block or NULL. */
+static const tlsphi_block *tlsphi_push_level(tlsph_solver *s, int level, double time, double step) {
+    tlsphi_rates *rates = &s->rates;
+    const size_t *first = rates->first + 2 * level;
+    if (first[0] == first[1]) return NULL;
+    tlsphi_move_level(s, level, time);
+    tlsphi_run_level(s, tlsphi_evaluate_block, TLSPHI_OWN);
+    for (size_t i = first[0]; i < first[1]; i++)
+        if (s->block[rates->list[i]].failed != TLSPHI_NONE) return s->block + rates->list[i];
+    rates->step = step;
+    tlsphi_run_level(s, tlsphi_flux_block, TLSPHI_ALL);
+    tlsphi_run_level(s, tlsphi_torque_block, TLSPHI_ALL);
+    tlsphi_load_level(s, 0);
+    tlsphi_apply_fixes(s, s->rate_p);
+    tlsphi_run_level(s, tlsphi_push_block, TLSPHI_ALL);
+    tlsphi_load_level(s, 1);
+    for (size_t i = first[0]; i < first[2]; i++) {
+        const tlsphi_block *block = s->block + rates->list[i];
+        for (int k = 0; k < 6; k++) s->body[block->body].owed[k] += step * block->moments[k];
+        s->account.dissipation += step * block->sums[TLSPHI_SUM_DISSIPATION];
+    }
+    return NULL;
+}
+/* Takes what resultant and torque the passes have left, by the smallest change of the motion at the end ([PROJECTION]).
+   Its work is the dissipation's, which was booked with v and not with w. */
+static void tlsphi_settle_rates(tlsphi_projection *p) {
+    tlsph_solver *s = p->s;
+    const size_t D = (size_t)s->dim;
+    memset(s->rate_p, 0, D * s->n * sizeof *s->rate_p);
+    tlsphi_find_moments(p);
+    for (size_t i = 0; i < s->bodies; i++) {
+        tlsphi_body *body = s->body + i;
+        double m[TLSPHI_MOMENTS] = {0}, origin[3], shift[3];
+        tlsphi_pass_position(s, body->first, origin);
+        tlsphi_cross3(origin, body->owed, shift);
+        for (int k = 0; k < 3; k++) m[k] = body->owed[k];
+        for (int k = 0; k < 3; k++) m[3 + k] = body->owed[3 + k] - shift[k];
+        tlsphi_multipliers(body, m);
+    }
+    tlsphi_run_tasks(s, tlsphi_correct_task, p);
+    tlsphi_apply_fixes(s, s->rate_p);
+    for (size_t i = 0; i < D * s->n; i++) {
+        const tlsph_real change = s->rate_p[i], mean = s->now.p[i] + change / 2;
+        s->account.dissipation -= (double)(s->V[i / D] / tlsphi_material_of(s, i / D)->rho * change * mean);
+        s->now.p[i] += change;
+    }
+}
+static void tlsphi_begin_rates(tlsphi_projection *p) {
+    tlsph_solver *s = p->s;
+    tlsphi_rates *rates = &s->rates;
+    const size_t reals = (size_t)s->dim * s->n;
+    s->damps = 1;
+    if (s->projection) tlsphi_find_rigid_motion(p);
+    for (size_t i = 0; i < s->bodies; i++) {
+        tlsphi_body *body = s->body + i;
+        memset(body->owed, 0, sizeof body->owed);
+        tlsphi_pass_position(s, body->first, body->from);
+        for (int k = 0; k < 3; k++) body->from[k] += body->centre[k];
+    }
+    for (int l = 0; l < rates->levels; l++) {
+        memcpy(rates->was + (size_t)l * reals, s->now.x, reals * sizeof *rates->was);
+        rates->last[l] = 0;
+        rates->level = l;
+        tlsphi_run_level(s, tlsphi_gradient_block, TLSPHI_TOUCHED); /* slopes for the dissipation beside other levels */
+    }
+    for (size_t i = 0; i < s->blocks; i++) s->block[i].reached = 0;
+    for (size_t i = 0; i < s->loads; i++)
+        if (!s->load[i].given.values) tlsphi_load_values(s, s->load + i, s->time);
+    tlsphi_run(s, tlsphi_hide_stress);
+}
+/* Returns the first failed block or NULL. */
+static const tlsphi_block *tlsphi_leap_by_rates(tlsph_solver *s, const tlsphi_stage *stage, double dt) {
+    const int finest = s->rates.levels - 1, steps = 1 << finest;
+    const double least = dt / steps;
+    tlsphi_projection projection;
+    projection.s = s;
+    projection.stage = *stage;
+    projection.dt = dt;
+    tlsphi_begin_rates(&projection);
+    for (int i = 1; i <= steps; i++) {
+        const tlsphi_block *bad = tlsphi_push_level(s, finest, (i - 0.5) * least, least);
+        int level = finest - 1; /* that whose step has its middle here */
+        for (int k = i; k % 2 == 0; k /= 2) level--;
+        if (!bad && level >= 0) bad = tlsphi_push_level(s, level, i * least, least * (1 << (finest - level)));
+        if (bad) return bad;
+    }
+    for (int l = 0; l <= finest; l++) tlsphi_move_level(s, l, dt);
+    if (s->projection) tlsphi_settle_rates(&projection);
+    return tlsphi_evaluate(s);
+}
+
 /* ==== [ALGORITHM] ==================================================================================================
    Algorithm 1 on a page: from state n to n + 1, with retries and the choice of the step. */
 
@@ -7022,7 +7327,8 @@ static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     for (int k = 0; k < scheme->stages; k++) {
         const tlsphi_stage *stage = scheme->stage + k;
         if (s->leaps) {
-            const tlsphi_block *bad = tlsphi_leap(s, stage, dt);
+            const tlsphi_block *bad =
+                s->rates.levels > 1 ? tlsphi_leap_by_rates(s, stage, dt) : tlsphi_leap(s, stage, dt);
             if (bad) return tlsphi_give_up(s, bad, split);
             continue;
         }
@@ -7391,7 +7697,7 @@ TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tl
     const tlsph_real *theta = field == TLSPH_FIELD_TEMPERATURE ? in : NULL;
     tlsphi_keep_state(s);
     for (size_t a = 0; a < s->n; a++) tlsphi_write_particle(s, a, field, in + components * s->host[a]);
-    if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s);
+    if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s, s->now.p);
     for (size_t a = 0; s->now.plastic && field == TLSPH_FIELD_F && a < s->n; a++) tlsphi_flow(s, a);
     for (size_t a = 0; s->thermal && a < s->n; a++)
         tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : (*tlsphi_theta(s, a)));
@@ -7573,6 +7879,22 @@ static int tlsphi_has_moments(const tlsph_desc *d) {
 static int tlsphi_is_cells(const tlsph_desc *d) {
     return d->operator_kind == TLSPH_CELLS || d->operator_kind == TLSPH_CELLS_4;
 }
+/* Why a scene may not have more than one step size, or NULL. */
+static const char *tlsphi_rates_refuse(const tlsph_desc *d) {
+    if (d->rates < 2) return NULL;
+    if (d->thermal) return "1 where E or entropy is evolved";
+    if (d->sharp_gradients || d->operator_kind == TLSPH_CELLS_4) return "1 with sharp gradients or TLSPH_CELLS_4";
+    if (d->dissipation == TLSPH_AS_PRINTED || d->dissipation == TLSPH_JST || d->audit)
+        return "1 with TLSPH_AS_PRINTED, TLSPH_JST or audit";
+    if (tlsphi_needs_bonds(d) || d->step_rule || d->volume_coupling || d->drift_relaxation > 0)
+        return "1 with operators of [BONDS], a step_rule by pairs, TLSPH_JOINT_AS_PRINTED or drift_relaxation";
+    for (size_t i = 0; d->materials && i < d->material_count; i++)
+        if (d->materials[i].kind == TLSPH_VON_MISES) return "1 with TLSPH_VON_MISES";
+    for (size_t i = 0; d->conditions && i < d->condition_count; i++)
+        if (d->conditions[i].kind == TLSPH_VELOCITY || d->conditions[i].kind == TLSPH_WALL)
+            return "1 with TLSPH_VELOCITY or TLSPH_WALL";
+    return NULL;
+}
 static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
     const tlsph_desc *d = plan->desc;
     const struct {
@@ -7614,6 +7936,7 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"incompressible.iteration_limit", (double)d->incompressible.iteration_limit, 1, 1e9, "1 or more"},
         {"incompressible.pseudo_modulus", (double)d->incompressible.pseudo_modulus, 1e-3, 1e9, "0.001 to 1e9"},
         {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
+        {"rates", (double)d->rates, 1, d->integrator == TLSPH_LEAPFROG ? 8.0 : 1.0, "1; to 8 with TLSPH_LEAPFROG"},
         {"threads", (double)d->threads, 0, 4096, "0 to 4096"},
         {"integrator", (double)d->integrator, 0, tlsphi_has_moments(d) ? TLSPH_RK4_FROZEN : TLSPH_LEAPFROG,
          "a Runge-Kutta scheme where particles have moments"},
@@ -7641,6 +7964,8 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
     if (d->scheme == TLSPH_INCOMPRESSIBLE && tlsphi_needs_bonds(d))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "operator", TLSPH_NO_PARTICLE, (double)d->operator_kind, 0,
                                 "plain corrected kernels, cells or given pairs with TLSPH_INCOMPRESSIBLE");
+    const char *const alone = tlsphi_rates_refuse(d);
+    if (alone) return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "rates", TLSPH_NO_PARTICLE, d->rates, 1, alone);
     const int pointers = d->materials && d->particles.positions &&
                          (d->particles.volumes || tlsphi_is_cells(d)) &&
                          (!d->condition_count || d->conditions) &&
@@ -7846,7 +8171,8 @@ static void tlsphi_smoothing_length(tlsphi_plan *plan) {
 }
 /* Blocks end with the rows' blocks and with bodies, tiles also with every TLSPHI_LANES particles. */
 static int tlsphi_block_begins(const tlsphi_plan *plan, size_t a) {
-    return a % TLSPHI_BLOCK == 0 || plan->body[a] != plan->body[a - 1];
+    return a % TLSPHI_BLOCK == 0 || plan->body[a] != plan->body[a - 1] ||
+           tlsphi_rate_class(plan, plan->host[a]) != tlsphi_rate_class(plan, plan->host[a - 1]);
 }
 static int tlsphi_tile_begins(const tlsphi_plan *plan, size_t a) {
     return a % TLSPHI_LANES == 0 || tlsphi_block_begins(plan, a);
@@ -8056,6 +8382,63 @@ static tlsph_result tlsphi_tiles(tlsphi_plan *plan) {
     return r || !plan->lattice ? r : tlsphi_graph_build(plan, 1);
 }
 
+/* -- levels of [MULTI-RATE] -- */
+
+/* Stable step of a particle over cfl. Its stress pushes neighbours, too, which may be lighter. */
+static double tlsphi_plan_step(tlsphi_plan *plan, size_t a, const uint32_t *list, const double *g, size_t count) {
+    const tlsph_desc *d = plan->desc;
+    const uint8_t *of = d->particles.materials;
+    const tlsphi_material m = tlsphi_calibrate(d->materials + (of ? of[a] : 0));
+    double sum = 0, lightest = 1;
+    for (size_t i = 0; i < count; i++) {
+        double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, middle[3];
+        tlsphi_pair_vectors(plan, a, list[i], g + (size_t)plan->dim * i, mine, other, middle);
+        sum += sqrt(tlsphi_dot3(mine, mine));
+        lightest = tlsphi_dmin(lightest, (double)(d->materials[of ? of[list[i]] : 0].density / m.rho));
+    }
+    plan->lightest[a] = sqrt(lightest);
+    return 2 * plan->dim * tlsphi_plan_volume(plan, a) / sum / (double)m.c_linear * plan->lightest[a];
+}
+/* Sets so many levels, `least` being the shortest step, and returns the work of a second, in steps of one particle. A
+   pass costs about 0.8 of one, for neighbours of its level 0.6, and ending the whole step 0.4. */
+static double tlsphi_plan_rates(tlsphi_plan *plan, int levels, const double *dt, double least, uint32_t *list,
+                                double *g) {
+    const double whole = least * (1 << (levels - 1)) * (1 - 1e-6);
+    double work = 0;
+    for (size_t a = 0; a < plan->n; a++)
+        for (plan->level[a] = 0; dt[a] * (1 << plan->level[a]) < whole;) plan->level[a]++;
+    for (size_t a = 0; a < plan->n; a++) {
+        const size_t count = tlsphi_neighbours_of(plan, a, list, g);
+        plan->seen[a] = 0;
+        for (size_t i = 0; i < count; i++)
+            if (plan->level[list[i]] != plan->level[a]) plan->seen[a] |= (uint8_t)(1u << plan->level[list[i]]);
+        work += levels == 1 ? 1 : 0.4 + 0.8 * (1 << plan->level[a]) + 0.6 * plan->seen[a];
+    }
+    return work / whole;
+}
+static tlsph_result tlsphi_plan_levels(tlsphi_plan *plan, uint32_t *list, double *g) {
+    double least = TLSPHI_LARGEST, longest = 0, best = TLSPHI_LARGEST;
+    plan->levels = 1;
+    if (plan->desc->rates < 2) return TLSPH_OK;
+    double *dt = TLSPHI_SCRATCH(plan, double, plan->n);
+    plan->level = TLSPHI_SCRATCH(plan, uint8_t, plan->n);
+    plan->seen = TLSPHI_SCRATCH(plan, uint8_t, plan->n);
+    plan->lightest = TLSPHI_SCRATCH(plan, double, plan->n);
+    if (!dt || !plan->level || !plan->seen || !plan->lightest) return tlsphi_no_memory(plan, 18.0 * (double)plan->n);
+    for (size_t a = 0; a < plan->n; a++) {
+        dt[a] = tlsphi_plan_step(plan, a, list, g, tlsphi_neighbours_of(plan, a, list, g));
+        least = tlsphi_dmin(least, dt[a]);
+        longest = tlsphi_dmax(longest, dt[a]);
+    }
+    for (int levels = 1; levels <= plan->desc->rates && least * (1 << (levels - 1)) <= longest; levels++) {
+        const double work = tlsphi_plan_rates(plan, levels, dt, least, list, g);
+        if (work < best) plan->levels = levels;
+        best = tlsphi_dmin(best, work);
+    }
+    tlsphi_plan_rates(plan, plan->levels, dt, least, list, g);
+    return TLSPH_OK;
+}
+
 /* Everything that creation can find out without the solver's memory. Leaves scratch for tlsphi_plan_release. */
 static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, tlsph_error *error) {
     tlsph_result r;
@@ -8097,7 +8480,7 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     if (desc->sharp_gradients && (!plan->antisymmetric || plan->bond))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "sharp_gradients", TLSPH_NO_PARTICLE, 1, 0,
                                 "0 where C_ab != -C_ba; use TLSPH_CELLS, or a box lattice with support 0.6");
-    if ((r = tlsphi_order(plan, parent, list, g))) return r;
+    if ((r = tlsphi_plan_levels(plan, list, g)) || (r = tlsphi_order(plan, parent, list, g))) return r;
     tlsphi_count_blocks(plan);
     return tlsphi_tiles(plan);
 }
@@ -8157,6 +8540,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->has_plastic |= d->materials[i].kind == TLSPH_VON_MISES;
         s->metal &= d->materials[i].kind == TLSPH_VON_MISES;
     }
+    s->rates.levels = plan->levels;
     s->turns = d->projection && d->operator_kind == TLSPH_CLOSED && !s->linear && !s->sharp && !s->incompressible;
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
@@ -8213,6 +8597,11 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
     if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
+    if (s->rates.levels > 1) {
+        s->rates.of = TLSPHI_TAKE(arena, uint8_t, n);
+        s->rates.list = TLSPHI_TAKE(arena, uint32_t, s->blocks * (size_t)s->rates.levels);
+        s->rates.was = TLSPHI_TAKE(arena, tlsph_real, (size_t)s->rates.levels * D * n);
+    }
     if (s->step_rule == TLSPH_STEP_BY_PAIR) s->least_stretch = TLSPHI_TAKE(arena, tlsph_real, n);
     if (s->dissipation == TLSPH_JST) s->lean = TLSPHI_TAKE(arena, tlsph_real, 2 * D * n);
     if (s->has_J) s->rate_J = TLSPHI_TAKE(arena, tlsph_real, n);
@@ -8273,7 +8662,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->materials = TLSPHI_TAKE(arena, tlsphi_material, s->material_count);
     const size_t fixed = arena->used;
     if (s->material_count > 1) s->material_of = TLSPHI_TAKE(arena, uint8_t, n);
-    if (s->material_count > 1) s->beside = TLSPHI_TAKE(arena, tlsph_real, 2 * n);
+    if (s->material_count > 1 || s->rates.levels > 1) s->beside = TLSPHI_TAKE(arena, tlsph_real, 2 * n);
     s->block = TLSPHI_TAKE(arena, tlsphi_block, s->blocks);
     s->body = TLSPHI_TAKE(arena, tlsphi_body, s->bodies);
     s->host = TLSPHI_TAKE(arena, uint32_t, n);
@@ -8311,6 +8700,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->size.pairs = s->pairs;
     s->size.neighbours_least = plan->least;
     s->size.neighbours_most = plan->most;
+    s->size.rates = plan->levels;
 }
 
 /* -- filling the block -- */
@@ -8454,6 +8844,29 @@ static void tlsphi_fill_interfaces(tlsph_solver *s, const tlsphi_plan *plan, uin
         s->beside[2 * a] = (tlsph_real)(1 / sqrt(stiffest));
         s->beside[2 * a + 1] = (tlsph_real)h;
     }
+}
+/* Levels, the blocks of each, and by how much longer than a particle's own step the whole one may be. */
+static void tlsphi_fill_rates(tlsph_solver *s, const tlsphi_plan *plan) {
+    tlsphi_rates *rates = &s->rates;
+    size_t at = 0;
+    if (rates->levels < 2) return;
+    for (size_t i = 0; i < s->blocks; i++) {
+        tlsphi_block *block = s->block + i;
+        for (size_t a = block->begin; a < block->end; a++) {
+            const uint32_t h = plan->host[a];
+            rates->of[a] = plan->level[h];
+            s->beside[2 * a] = (tlsph_real)(plan->lightest[h] * (1 << plan->level[h]));
+            block->seen |= plan->seen[h];
+        }
+        block->level = rates->of[block->begin];
+    }
+    for (int l = 0; l < rates->levels; l++)
+        for (int other = 0; other < 2; other++) {
+            rates->first[2 * l + other] = at;
+            for (uint32_t i = 0; i < s->blocks; i++)
+                if (other ? s->block[i].seen >> l & 1 : s->block[i].level == l) rates->list[at++] = i;
+        }
+    rates->first[2 * rates->levels] = at;
 }
 static void tlsphi_fill_fixes(tlsph_solver *s, const tlsphi_plan *plan) {
     const size_t D = (size_t)s->dim;
@@ -8655,6 +9068,7 @@ static tlsph_result tlsphi_fill_solver(tlsph_solver *s, tlsphi_plan *plan) {
     tlsphi_fill_fourth(s, plan, list, g);
     tlsphi_fill_laplacian(s);
     tlsphi_fill_interfaces(s, plan, list, g);
+    tlsphi_fill_rates(s, plan);
     tlsphi_fill_fixes(s, plan);
     tlsphi_fill_mirrors(s, plan);
     tlsphi_fill_turns(s);
@@ -8774,6 +9188,7 @@ TLSPHI_DEF tlsph_desc tlsph_desc_default(int dimension) {
     d.dissipation_heats = 1;
     d.projection = 1;
     d.cfl = TLSPHI_R(0.3);
+    d.rates = 1;
     d.incompressible.laplacian = TLSPHI_R(0.25);
     d.incompressible.tolerance = sizeof(tlsph_real) == 8 ? TLSPHI_R(1e-6) : TLSPHI_R(1e-5);
     d.incompressible.iteration_limit = 1000;
