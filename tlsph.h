@@ -7158,7 +7158,7 @@ static void tlsphi_load_particle(tlsph_solver *s, const tlsphi_load *load, size_
     const tlsph_real *p = s->now.p + D * a, half = (tlsph_real)(dt / 2), per_rho = 1 / tlsphi_material_of(s, a)->rho;
     tlsph_real force[3] = {0, 0, 0}, *rate = s->rate_p + D * a;
     double x[3], f[3], turn[3];
-    tlsphi_load_force(s, load, i, force);
+    tlsphi_load_force(s, load, i, force, NULL); /* not behind surfaces */
     for (size_t k = 0; k < D; k++) {
         if (done) s->account.external_work += dt * (double)(force[k] * (p[k] - half * rate[k]) * per_rho);
         else rate[k] += force[k] / s->V[a];
@@ -7938,11 +7938,11 @@ static tlsph_result tlsphi_check_description(tlsphi_plan *plan) {
         {"cfl", (double)d->cfl, 1e-9, 1, "more than 0, at most 1"},
         {"rates", (double)d->rates, 1, d->integrator == TLSPH_LEAPFROG ? 8.0 : 1.0, "1; to 8 with TLSPH_LEAPFROG"},
         {"threads", (double)d->threads, 0, 4096, "0 to 4096"},
-        {"integrator", (double)d->integrator, 0, tlsphi_has_moments(d) ? TLSPH_RK4_FROZEN : TLSPH_LEAPFROG,
+        {"integrator", (double)d->integrator, 0, (double)(tlsphi_has_moments(d) ? TLSPH_RK4_FROZEN : TLSPH_LEAPFROG),
          "a Runge-Kutta scheme where particles have moments"},
-        {"conduction_stages", (double)d->conduction_stages, 0, tlsphi_has_moments(d) ? 0 : 1000,
+        {"conduction_stages", (double)d->conduction_stages, 0, tlsphi_has_moments(d) ? 0.0 : 1000.0,
          "0 where particles have moments"},
-        {"scheme", (double)d->scheme, 0, tlsphi_has_moments(d) ? TLSPH_EXPLICIT : TLSPH_INCOMPRESSIBLE,
+        {"scheme", (double)d->scheme, 0, (double)(tlsphi_has_moments(d) ? TLSPH_EXPLICIT : TLSPH_INCOMPRESSIBLE),
          "TLSPH_EXPLICIT where particles have moments"},
         {"particles.spacing", (double)d->particles.spacing, 0, TLSPHI_LARGEST, "0 (from the weights) or more"},
         {"material_count", (double)d->material_count, 1, 256, "1 to 256"},
