@@ -3589,6 +3589,7 @@ struct tlsph_solver {
     int heat_moves; /* the fluxes hold conduction: conducts, but for the mechanical part of a split step */
     tlsphi_super super;
     int audit, projection, dissipation_heats, retries, threads, bonds;
+    int gathers_w;     /* grad w is a sum over neighbours; else it comes from that of v, see tlsphi_take_turn */
     int keeps_pairs;   /* `neighbour` and `g` are there; else only the graph of [TILES] */
     int turns;         /* the body's spin turns F exactly (tlsphi_turn_gradient) */
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
@@ -4555,10 +4556,52 @@ TLSPHI_INLINE void tlsphi_contract(const int n, const tlsph_real *row, const tls
         for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] += row[i * TLSPHI_ROW + l] * G[i * TLSPHI_LANES + l];
     for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] *= scale[l];
 }
+/* The particles first to last of a tile: n components of each become lanes. */
+TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, size_t first, size_t last, tlsph_real *to) {
+    if (last - first == TLSPHI_LANES) tlsphi_transpose(from, n, to);
+    else
+        for (size_t l = first; l < last; l++)
+            for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
+}
+/* w = v - spin x (x - centre) - mean, to its rows, and grad w = grad v - spin x F in place of G = grad v. As F is the gradient
+   of x this saves a gather; it sees x and F of the stage, which is as exact for rigid and affine motions, but where forces
+   take torques about x_next it is not their adjoint to the last digit: scenes with E or eta gather grad w. */
+TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *body, size_t base, size_t first, size_t last,
+                                    const int dim, tlsph_real *G) {
+    const size_t D = (size_t)dim, dd = D * D;
+    const tlsph_real *x = s->linear ? s->X : s->now.x, *v = tlsphi_at(s, s->rows.v, base);
+    tlsph_real arm[3 * TLSPHI_LANES_MOST] = {0}, F[9 * TLSPHI_LANES_MOST] = {0}, w[3 * TLSPHI_LANES_MOST];
+    tlsph_real spin[3], mean[3], centre[3] = {0, 0, 0};
+    for (size_t i = 0; i < 3; i++) {
+        spin[i] = (tlsph_real)body->spin[i];
+        mean[i] = (tlsph_real)body->v_mean[i];
+        if (i < D) centre[i] = (tlsph_real)((double)x[D * body->first + i] + body->centre[i]);
+    }
+    tlsphi_take_lanes(x + D * base, D, first, last, arm);
+    if (!s->linear) tlsphi_take_lanes(s->now.F + dd * base, dd, first, last, F);
+    else
+        for (size_t i = 0; i < D; i++)
+            for (size_t l = 0; l < TLSPHI_LANES; l++) F[(D + 1) * i * TLSPHI_LANES + l] = 1;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        TLSPHI_UNROLL for (int k = 0; k <= dim; k++) { /* the columns of F, and the arm */
+            tlsph_real column[3] = {0}, turn[3];
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) column[i] =
+                k < dim ? F[(size_t)(dim * i + k) * TLSPHI_LANES + l] : arm[(size_t)i * TLSPHI_LANES + l] - centre[i];
+            turn[0] = spin[1] * column[2] - spin[2] * column[1];
+            turn[1] = spin[2] * column[0] - spin[0] * column[2];
+            turn[2] = spin[0] * column[1] - spin[1] * column[0];
+            TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
+                if (k < dim) G[(size_t)(dim * i + k) * TLSPHI_LANES + l] -= turn[i];
+                else w[(size_t)i * TLSPHI_LANES + l] = v[(size_t)i * TLSPHI_ROW + l] - mean[i] - turn[i];
+            }
+        }
+    }
+    tlsphi_store_rows(dim, w, first, last, tlsphi_at(s, s->rows.w, base));
+}
 /* What becomes of the raw sums of the particles [begin, end) of a tile. E without its kinetic part changes by P : grad w
    (see [PROJECTION]), J by H : grad v; PM : (raw sum) and HM : (raw sum) are the same, and adjoint to T_a. */
-TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, size_t begin, size_t end, const int dim, int with_w,
-                                       int with_S, int with_theta, tlsphi_slopes *sum) {
+TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block *block, size_t begin, size_t end,
+                                       const int dim, int with_w, int with_S, int with_theta, tlsphi_slopes *sum) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
     const int dd = dim * dim;
     tlsph_real *row = tlsphi_at(s, 0, base), *M = NULL;
@@ -4582,6 +4625,7 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, size_t begin, size
     for (size_t l = first; l < last; l++)
         TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) s->grad_v[(size_t)dd * (base + l) + i] =
             sum->v[i * TLSPHI_LANES + l];
+    if (s->projection && !s->gathers_w) tlsphi_take_turn(s, s->body + block->body, base, first, last, dim, w);
     tlsphi_store_rows(dd, w, first, last, row + (size_t)s->rows.grad_w * TLSPHI_ROW);
     if (with_S) {
         tlsphi_finish_gradients(scale, M, dim, 1, sum->S);
@@ -4613,7 +4657,7 @@ TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_bloc
         if (with_S) tlsphi_gradient_rows(a + S, b + S, g, dim, 1, sum.S);
         if (with_theta) tlsphi_gradient_rows(a + theta, b + theta, g, dim, 1, sum.theta);
     }
-    tlsphi_store_slopes(s, begin, end, dim, with_w, with_S, with_theta, &sum);
+    tlsphi_store_slopes(s, block, begin, end, dim, with_w, with_S, with_theta, &sum);
 }
 
 /* The part of r_ab ([BONDS]): a gather of its own, so that other operators have no branch in theirs. */
@@ -4751,7 +4795,7 @@ static void tlsphi_turn_gradient(tlsph_solver *s, const double spin[3], size_t a
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     const int with_S = s->has_J && s->damps, with_theta = s->heat_moves;
     /* w and Sigma_J are there for the dissipation, E and turns */
-    const int with_w = s->projection && (s->damps || s->rate_E || s->turns);
+    const int with_w = s->gathers_w && (s->damps || s->rate_E || s->turns);
     const tlsphi_image *image = tlsphi_find_image(s, block->begin), *last = s->image + s->images;
     for (size_t a = block->begin, tile = block->tile, end; a < block->end; a = end, tile++) {
         end = tlsphi_tile_end(block, a);
@@ -5826,24 +5870,25 @@ TLSPHI_INLINE void tlsphi_take_arrows(const tlsph_real *f, size_t D, size_t begi
     for (size_t i = 0; i < D; i++)
         for (size_t a = begin; a < end; a++) out->f[i][a - base] = (double)f[D * a + i];
 }
-/* Sums of V, V X, V X X (6), V f, V X x f, lane by lane. */
-TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, double (*m)[TLSPHI_LANES_MOST]) {
+/* Sums of V f, V X x f and, if asked for, V, V X, V X X (6), lane by lane. */
+TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia, double (*m)[TLSPHI_LANES_MOST]) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         const double V = u->V[l], X[3] = {u->X[0][l], u->X[1][l], u->X[2][l]}, f[3] = {u->f[0][l], u->f[1][l], u->f[2][l]};
         double Xf[3];
         tlsphi_cross3(X, f, Xf);
-        m[0][l] += V;
+        if (with_inertia) m[0][l] += V;
         TLSPHI_UNROLL for (int k = 0; k < 3; k++) {
-            m[1 + k][l] += V * X[k];
-            m[4 + k][l] += V * X[k] * X[k];
-            m[7 + k][l] += V * X[(k + 1) % 3] * X[(k + 2) % 3];
+            if (with_inertia) m[1 + k][l] += V * X[k];
+            if (with_inertia) m[4 + k][l] += V * X[k] * X[k];
+            if (with_inertia) m[7 + k][l] += V * X[(k + 1) % 3] * X[(k + 2) % 3];
             m[10 + k][l] += V * f[k];
             m[13 + k][l] += V * Xf[k];
         }
     }
 }
 /* Moments of a vector field over a block: its lanes are added in order at the end. */
-static void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const tlsph_real *field) {
+TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const tlsph_real *field,
+                                        const int with_inertia) {
     double m[TLSPHI_MOMENTS][TLSPHI_LANES_MOST], origin[3];
     tlsphi_arms arms;
     memset(m, 0, sizeof m);
@@ -5852,7 +5897,7 @@ static void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block
         end = tlsphi_tile_end(block, begin);
         tlsphi_take_arms(p, origin, begin, end, &arms);
         tlsphi_take_arrows(field, (size_t)p->s->dim, begin, end, &arms);
-        tlsphi_add_arms(&arms, m);
+        tlsphi_add_arms(&arms, with_inertia, m);
     }
     for (int k = 0; k < TLSPHI_MOMENTS; k++) {
         block->moments[k] = 0;
@@ -5862,13 +5907,13 @@ static void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block
 /* Moments of v. */
 static void tlsphi_rigid_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
-    tlsphi_block_moments(p, p->s->block + i, p->s->v);
+    tlsphi_block_moments(p, p->s->block + i, p->s->v, 1);
 }
 /* Sums of T | X x T, from the same moments. */
 static void tlsphi_torque_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
     tlsphi_block *block = p->s->block + i;
-    tlsphi_block_moments(p, block, p->s->rate_p);
+    tlsphi_block_moments(p, block, p->s->rate_p, 0);
     for (int k = 0; k < 6; k++) block->moments[k] = block->moments[10 + k];
 }
 /* x with I x = moment, within the turns that the body's mirror planes allow. */
@@ -6018,7 +6063,7 @@ static void tlsphi_find_moments(tlsphi_projection *p) {
 }
 static void tlsphi_find_rigid_motion(tlsphi_projection *p) {
     tlsphi_find_moments(p);
-    tlsphi_run_tasks(p->s, tlsphi_relative_task, p);
+    if (p->s->gathers_w) tlsphi_run_tasks(p->s, tlsphi_relative_task, p);
 }
 static void tlsphi_project_forces(tlsphi_projection *p, void (*solve)(tlsphi_body *body, const double *moments)) {
     tlsphi_run_tasks(p->s, tlsphi_torque_task, p);
@@ -8542,6 +8587,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     }
     s->rates.levels = plan->levels;
     s->turns = d->projection && d->operator_kind == TLSPH_CLOSED && !s->linear && !s->sharp && !s->incompressible;
+    s->gathers_w = s->projection && (s->thermal || s->turns || s->frozen || s->bonds || s->sharp || s->incompressible);
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
         s->rows.lap_p = s->rows.count;
