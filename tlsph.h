@@ -2496,6 +2496,7 @@ typedef struct tlsphi_closer {
     double *sums;                 /* 2 a task */
     uint32_t *part;               /* number of the connected part with each root, and the parts' turns */
     struct tlsphi_closure_turn *turn;
+    double missing;               /* what the last turn had to give */
     double step, beta, eased, unit; /* eased: share of the slack; unit: m */
 } tlsphi_closer;
 
@@ -2625,13 +2626,15 @@ static void tlsphi_closure_invert(size_t n, double *A) {
    V n (n.(y_0 + Y X)): D (D + 1) equations A y = R a part. */
 typedef struct tlsphi_closure_turn { double A[144], y[12], V, MV; } tlsphi_closure_turn;
 /* y = A^-1 y; A may lack directions, for instance the turns of a ball. sum B (x) X = sum K, and behind surfaces sum B (x) X + T
-   = sum M K: it changes with the lengths of B by the mean of M as much. */
+   = sum M K: it changes with the lengths of B by the mean of M as much. There the turns of a ball do need something, which lengths
+   cannot give: a little damping keeps them from trying. */
 static void tlsphi_closure_turn_solve(tlsphi_closure_turn *t, size_t N) {
     double y[12], most = 0;
     for (size_t k = 0; k < N; k++) most = tlsphi_dmax(most, t->A[(N + 1) * k]);
     for (size_t k = 0; k < N; k++) {
         t->A[(N + 1) * k] += 1e-12 * most;
         y[k] = t->y[k] * (k % (N == 12 ? 4 : 3) ? t->V / t->MV : 1);
+        if (k % (N == 12 ? 4 : 3) && t->MV > t->V) t->A[(N + 1) * k] *= 1.02;
     }
     tlsphi_closure_invert(N, t->A);
     for (size_t k = 0; k < N; k++) {
@@ -2721,7 +2724,8 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, i
     tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
     for (size_t i = 0; i < size; i++) c->r[i] = again ? 0 : tlsphi_closure_open(c, i / 4, i % 4);
     const tlsph_result turned = tlsphi_closure_turn_all(c, parent, &missing);
-    if (turned || (again && !(missing > 10 * TLSPHI_CLOSURE_BALANCE))) return turned;
+    if (turned || (again > 2 && !(missing < 0.8 * c->missing)) || (again && !(missing > 10 * TLSPHI_CLOSURE_BALANCE))) return turned;
+    c->missing = missing;
     packed.rows = 1;
     packed.x = c->p;
     packed.p = c->p + size;
@@ -2729,7 +2733,7 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, i
     memset(packed.x, 0, size * sizeof *packed.x);
     const tlsph_result r = tlsphi_closure_iterate(&packed, TLSPHI_CLOSURE_BALANCE, &residual);
     for (size_t i = 0; i < size; i++) c->x[c->rows * (i - i % 4) + i % 4] += packed.x[i];
-    return r || !c->plan->desc->particles.moments || again == 12 ? r : tlsphi_closure_balance(c, parent, again + 1);
+    return r || !c->plan->desc->particles.moments || again == 20 ? r : tlsphi_closure_balance(c, parent, again + 1);
 }
 
 /* V I - T of host particle a, padded to 3x3. */

@@ -330,7 +330,8 @@ TEST(slow_modes_behind_the_surface)
         p.periods = 1;
         p.options.placement = 1;
         p.options.threads = 1;
-        REQUIRE_OK(cloud_mode_create(&p, &mode, NULL));
+        tlsph_error error;
+        if (!CHECK_RESULT(cloud_mode_create(&p, &mode, &error), TLSPH_OK)) { REPORT("%d: %s", k, error.message); return; }
         CHECK_RESULT(cloud_mode_measure(&mode, &frequency[k], NULL, NULL), TLSPH_OK);
         scene_destroy(&mode.body);
     }

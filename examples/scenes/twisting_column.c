@@ -65,7 +65,7 @@ void twisting_column_read(const twisting_column *column, twisting_column_shape *
     for (size_t i = 0; x && v && i < particles->count; i++) {
         const tlsph_real *X = particles->positions + 3 * i, *xi = x + 3 * i;
         const double V = (double)particles->volumes[i];
-        if ((double)X[1] < top * (1 - 1e-5)) continue; /* below the topmost layer */
+        if (particles->moments ? !(particles->areas[3 * i + 1] > 0) : (double)X[1] < top * (1 - 1e-5)) continue; /* below */
         volume += V;
         height += V * (double)xi[1];
         cosine += V * ((double)X[0] * (double)xi[0] + (double)X[2] * (double)xi[2]);
