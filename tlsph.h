@@ -7112,12 +7112,13 @@ static void tlsphi_pass_position(const tlsph_solver *s, size_t a, double x[3]) {
     tlsphi_vector3((s->linear ? s->X : s->now.x) + (size_t)s->dim * a, s->dim, x);
 }
 /* Moves x to the time of the pass. The rows of v become mean velocities since the level was moved last, those of w the
-   same without the rigid motion that the body had when the step began. */
+   same without the rigid motion that the body had when the step began, seen from the middle of that time. */
 static void tlsphi_view_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
     const tlsphi_rates *rates = &s->rates;
     const tlsphi_body *body = s->body + block->body;
     const tlsph_real dt = (tlsph_real)(rates->time - block->reached), per = 1 / rates->elapsed;
+    const double middle = rates->time - (double)rates->elapsed / 2;
     tlsph_real *was = rates->was + (size_t)rates->level * D * s->n, v[3];
     for (size_t a = block->begin; a < block->end; a++) {
         const tlsph_real move = dt / tlsphi_material_of(s, a)->rho;
@@ -7129,7 +7130,9 @@ static void tlsphi_view_block(tlsph_solver *s, tlsphi_block *block) {
         }
         tlsphi_row_put(s, s->rows.v, s->dim, a, v);
         tlsphi_pass_position(s, a, arm);
-        for (int k = 0; k < 3; k++) arm[k] -= body->from[k] + (s->linear ? 0 : rates->time * body->v_mean[k]);
+        for (size_t k = 0; k < D; k++)
+            arm[k] -= s->linear ? body->from[k]
+                                : body->from[k] + middle * body->v_mean[k] + (rates->time - middle) * (double)v[k];
         tlsphi_cross3(body->spin, arm, turn);
         for (size_t k = 0; s->projection && k < D; k++) v[k] -= (tlsph_real)(body->v_mean[k] + turn[k]);
         tlsphi_row_put(s, s->rows.w, s->dim, a, v);
@@ -8591,7 +8594,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     }
     s->rates.levels = plan->levels;
     s->turns = d->projection && d->operator_kind == TLSPH_CLOSED && !s->linear && !s->sharp && !s->incompressible;
-    s->gathers_w = s->projection && (s->thermal || s->turns || s->frozen || s->bonds || s->sharp || s->incompressible);
+    s->gathers_w = s->projection && (s->thermal || s->turns || s->frozen || s->bonds || s->sharp || s->incompressible ||
+                                     s->rates.levels > 1); /* F is not that of the pass */
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
         s->rows.lap_p = s->rows.count;

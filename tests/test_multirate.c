@@ -206,6 +206,36 @@ TEST(noise_dies)
     }
 }
 
+/* The same motion seen from a frame that flies by: at 1000 times the speed of the motion it differs by round-off. */
+TEST(flying_by)
+{
+    tlsph_real *u[2] = {NULL, NULL}, *v;
+    double lost[2] = {0, 0};
+    two_parts s;
+    DOUBLE_ONLY();
+    if (!parts_begin(&s, 3, 7)) return;
+    const size_t reals = 3 * s.cloud.particles.count;
+    for (int i = 0; i < 2; i++) {
+        tlsph_ledger l;
+        if (!parts_create(&s) || !parts_kick(&s, 1.5)) break;
+        v = read_field(s.solver, TLSPH_FIELD_VELOCITY);
+        for (size_t k = 0; i && k < reals; k += 3) v[k] += 1000;
+        CHECK_RESULT(tlsph_write(s.solver, TLSPH_FIELD_VELOCITY, v), TLSPH_OK);
+        CHECK_RESULT(steps_of(s.solver, 0.001, 20), TLSPH_OK);
+        u[i] = read_field(s.solver, TLSPH_FIELD_DISPLACEMENT);
+        for (size_t k = 0; i && k < reals; k += 3) u[1][k] -= 1000 * tlsph_time(s.solver);
+        tlsph_ledger_read(s.solver, &l);
+        lost[i] = l.dissipation;
+        free(v);
+    }
+    REPORT(" displacements %.0e, dissipation %.0e", difference(u[1], u[0], reals), lost[1] / lost[0] - 1);
+    CHECK_BELOW(difference(u[1], u[0], reals), 1e-9);
+    CHECK_CLOSE(lost[1] / lost[0], 1, 1e-6);
+    free(u[0]);
+    free(u[1]);
+    parts_end(&s);
+}
+
 /* ---- levels ------------------------------------------------------------------------------------------------------ */
 
 /* With one material there is nothing to gain: the plain leapfrog, bitwise. */
@@ -346,5 +376,5 @@ TEST(refusals)
     parts_end(&s);
 }
 
-SUITE(multirate, ENTRY(momenta), ENTRY(order_in_the_step), ENTRY(noise_dies), ENTRY(equal_steps), ENTRY(whole_step),
-      ENTRY(threads_and_checkpoints), ENTRY(failures), ENTRY(refusals))
+SUITE(multirate, ENTRY(momenta), ENTRY(order_in_the_step), ENTRY(noise_dies), ENTRY(flying_by), ENTRY(equal_steps),
+      ENTRY(whole_step), ENTRY(threads_and_checkpoints), ENTRY(failures), ENTRY(refusals))
