@@ -583,8 +583,8 @@ typedef struct tlsph_fill {
     tlsph_placement placement;
     tlsph_real jitter;              /* inner particles move by up to jitter x spacing along each axis; 0 to 0.45 */
     uint64_t seed;                  /* of the jitter */
-    int voronoi;                    /* 1: volumes and area vectors from Voronoi cells, for TLSPH_CLOSED; with TLSPH_CELL_CENTRED
-                                       moments, too; default 0 */
+    int voronoi;                    /* 1: volumes and area vectors from Voronoi cells, for TLSPH_CLOSED; with
+                                       TLSPH_CELL_CENTRED moments, too; default 0 */
     tlsph_inside_fn inside;         /* TLSPH_PREDICATE */
     void *inside_user;
     tlsph_length_fn distance;       /* TLSPH_DISTANCE: right near the surface; min joins bodies, max cuts, - turns inside out */
@@ -2691,10 +2691,12 @@ static tlsph_result tlsphi_closure_turn_all(tlsphi_closer *c, uint32_t *parent, 
     const tlsph_real *X = c->plan->desc->particles.positions;
     const size_t N = (c->rows - 1) * c->rows;
     uint32_t parts = 0;
-    if (!c->part && !(c->part = TLSPHI_SCRATCH(c->plan, uint32_t, c->n))) return tlsphi_no_memory(c->plan, 4.0 * (double)c->n);
+    if (!c->part && !(c->part = TLSPHI_SCRATCH(c->plan, uint32_t, c->n)))
+        return tlsphi_no_memory(c->plan, 4.0 * (double)c->n);
     for (size_t a = 0; a < c->n; a++)
         if (parent[a] == a) c->part[a] = parts++;
-    if (!c->turn && !(c->turn = TLSPHI_SCRATCH(c->plan, tlsphi_closure_turn, parts))) return tlsphi_no_memory(c->plan, 1248.0 * parts);
+    if (!c->turn && !(c->turn = TLSPHI_SCRATCH(c->plan, tlsphi_closure_turn, parts)))
+        return tlsphi_no_memory(c->plan, (double)sizeof *c->turn * parts);
     tlsphi_closure_turn *const turn = c->turn;
     memset(turn, 0, parts * sizeof *turn);
     for (int apply = 0; apply < 2; apply++) {
@@ -2714,7 +2716,7 @@ static tlsph_result tlsphi_closure_turn_all(tlsphi_closer *c, uint32_t *parent, 
 static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, int again) {
     tlsphi_closer packed = *c;
     const size_t size = 4 * c->n;
-    double residual, missing;
+    double residual, missing = 0;
     for (size_t i = 0; i < c->n; i++) {
         double sum = 0;
         for (size_t k = c->first[i]; k < c->first[i + 1]; k++) sum += (double)c->pair[k][0];
@@ -2724,7 +2726,8 @@ static tlsph_result tlsphi_closure_balance(tlsphi_closer *c, uint32_t *parent, i
     tlsphi_closure_run(c, tlsphi_closure_product_task, NULL);
     for (size_t i = 0; i < size; i++) c->r[i] = again ? 0 : tlsphi_closure_open(c, i / 4, i % 4);
     const tlsph_result turned = tlsphi_closure_turn_all(c, parent, &missing);
-    if (turned || (again > 2 && !(missing < 0.8 * c->missing)) || (again && !(missing > 10 * TLSPHI_CLOSURE_BALANCE))) return turned;
+    const int vain = again > 2 && !(missing < 0.8 * c->missing), enough = again && !(missing > 10 * TLSPHI_CLOSURE_BALANCE);
+    if (turned || vain || enough) return turned;
     c->missing = missing;
     packed.rows = 1;
     packed.x = c->p;
@@ -2859,7 +2862,8 @@ static tlsph_result tlsphi_closure_start(tlsphi_closer *c) {
         tlsphi_closed_moment(c->plan, c->plan->grid.order[i], A);
         for (size_t j = 0; j < 4 * rows; j++) /* slack holds for the change from the start */
             c->r[4 * rows * i + j] = j < 4 ? tlsphi_closure_open(c, i, j)
-                                           : (j % 4 < D ? 2 * A[3 * (j % 4) + j / 4 - 1] / volume : 0) - q[j] + c->slack[i][3] * p[j];
+                                           : (j % 4 < D ? 2 * A[3 * (j % 4) + j / 4 - 1] / volume : 0) - q[j] +
+                                                 c->slack[i][3] * p[j];
     }
     memcpy(c->x, c->p, 4 * rows * c->n * sizeof *c->x);
     return TLSPH_OK;
@@ -3519,7 +3523,7 @@ typedef struct tlsphi_held_part {
     uint32_t particle, load, item; /* whose values are `wanted`; load TLSPHI_NONE: at rest */
     int along;                     /* 0: all components are held, 1: that along N, -1: those across N */
     int mirror;                    /* the other components do not change along N */
-    tlsph_real N[3];
+    tlsph_real N[3], damping;      /* share of the damping: the particle's own weight in v_o to the power -2 */
     tlsph_real wanted[3], jump[3]; /* v of the surface, and what the extrapolated v lacks of it */
     tlsphi_part part;
 } tlsphi_held_part;
@@ -4343,8 +4347,9 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
      grad v += S [(u - v_a) (x) B - grad v_a T^T] / V_a  (S (u - v_o) (x) B/V where it is flat),   force on the part S P_a B,
 
    S: the components that are held. Its power is that of the wall, so E stays exact. Linear fields and uniform stress are
-   exact for any u and S, so parts of different conditions may meet in a particle. The wall damps, too, by half of the
-   impedance: D = rho |B|/2 (c_p nn + c_s (I - nn)) S (u - v_o), heat D.(u - v_o) >= 0.
+   exact for any u and S, so parts of different conditions may meet in a particle. The wall damps, too, with half of the
+   impedance as the particle feels it: D = rho |B|/(2 k^2) (c_p nn + c_s (I - nn)) S (u - v_o), k = 1 - sum_b y_b, heat
+   D.(u - v_o) >= 0. Without k^2 clamped corners were unstable.
    At a mirror (roller, tangentially fixed) the other components are even: their v_o is v_a + grad v_a (I - NN) o, which halves
    their slope along N as the image of the particle would.
    A prescribed temperature fixes theta_a so that theta_o is the given one. */
@@ -4431,7 +4436,7 @@ static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_par
     tlsphi_row_get(s, s->rows.wave, 3, a, wave);
     tlsphi_product(dim, A, h->part.W, H);
     tlsphi_multiply(dim, H, h->part.B, c);
-    const tlsph_real half = wave[2] * tlsphi_sqrt(tlsphi_dot(dim, h->part.B, h->part.B)) / 2;
+    const tlsph_real half = h->damping * wave[2] * tlsphi_sqrt(tlsphi_dot(dim, h->part.B, h->part.B)) / 2;
     const tlsph_real normal = tlsphi_dot(dim, c, h->jump) * tlsphi_inverse_or_0(tlsphi_dot(dim, c, c));
     for (size_t i = 0; i < D; i++)
         damping[i] = s->dissipation == TLSPH_NO_DISSIPATION
@@ -5567,7 +5572,8 @@ static int tlsphi_driven_behind(const tlsphi_load *load, size_t i) {
 }
 
 /* The force of a load on its i-th particle, N; behind the surface also its first moment Z. */
-static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real force[3], tlsph_real Z[9]) {
+static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real force[3],
+                              tlsph_real Z[9]) {
     const size_t a = load->inner[i], D = (size_t)s->dim;
     const tlsph_real *value = load->values + 3 * i;
     tlsph_real factor = 1;
@@ -5590,7 +5596,8 @@ static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, si
 }
 
 /* A force on particle a, N. */
-static void tlsphi_push_particle(tlsph_solver *s, size_t a, const tlsph_real force[3], const tlsphi_stage *stage, double dt) {
+static void tlsphi_push_particle(tlsph_solver *s, size_t a, const tlsph_real force[3], const tlsphi_stage *stage,
+                                 double dt) {
     const size_t D = (size_t)s->dim;
     const double share = stage->rate_weight * dt;
     tlsphi_account *account = &s->account;
@@ -5768,7 +5775,8 @@ static void tlsphi_hold_temperature(tlsph_solver *s, tlsphi_load *load, double w
     tlsphi_load_values(s, load, time);
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        const tlsph_real theta = load->part ? tlsphi_temperature_behind(s, load, i) : load->values[i], before = s->now.E[a];
+        const tlsph_real theta = load->part ? tlsphi_temperature_behind(s, load, i) : load->values[i];
+        const tlsph_real before = s->now.E[a];
         if (!tlsphi_set_temperature(s, a, theta)) continue; /* the evaluation that follows reports it */
         const double gain = weight * (double)((s->now.E[a] - before) * s->V[a]);
         s->account.external_heat += s->thermal == TLSPH_ENTROPY ? gain * (double)theta : gain;
@@ -8812,6 +8820,7 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
         const uint32_t h = plan->host[a];
         const size_t start = s->first[a], count = tlsphi_neighbours_of(plan, h, list, g);
         double B[3] = {0, 0, 0}, sum = 0;
+        const int behind = plan->closed_C && s->M; /* there sum g is the area vector; tau by the longer of C_ab and C_ba */
         s->first[a + 1] = start + count;
         TLSPH_ASSERT(start + count <= s->pairs);
         for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
@@ -8822,13 +8831,12 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
             if (s->keeps_pairs) s->neighbour[start + i] = list[i];
             for (size_t k = 0; k < D; k++) {
                 const double C = middle[k];
-                const int behind = plan->closed_C && s->M; /* there sum g is the area vector itself */
                 if (s->rest) s->rest[D * (start + i) + k] = (tlsph_real)(mine[k] - C);
                 if (s->keeps_pairs) s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
                 B[k] -= behind ? g[D * i + k] : C;
                 square += mine[k] * mine[k];
             }
-            sum += sqrt(square);
+            sum += sqrt(behind ? tlsphi_dmax(square, tlsphi_dot3(other, other)) : square);
         }
         for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
         s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum /
@@ -9040,6 +9048,10 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
                 if (h->along) tlsphi_unit_normal(c, s->dim, N);
                 for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
                 h->part = tlsphi_part_of(s, plan, c, a);
+                tlsph_real MB[3] = {0, 0, 0}; /* sum of g is -B */
+                tlsphi_multiply(s->dim, s->M + (size_t)(s->dim * s->dim) * a, s->B + (size_t)s->dim * a, MB);
+                const tlsph_real own = 1 + tlsphi_max(0, tlsphi_dot(s->dim, h->part.o, MB)) / (2 * s->V[a]);
+                h->damping = 1 / (own * own);
             }
             load += !tlsphi_is_constraint(c->kind);
         }
