@@ -249,6 +249,11 @@ static void read_desc(reader *r, tlsph_desc *d)
         d->incompressible.laplacian_as_printed = byte(r) % 2;
         d->incompressible.tolerance = (tlsph_real)0.001;
         break;
+    case 12:
+        d->rates = byte(r) % 10;
+        d->thermal = TLSPH_ISOTHERMAL;
+        d->integrator = TLSPH_LEAPFROG;
+        break;
     default: break;
     }
     d->threads = 1;

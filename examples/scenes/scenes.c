@@ -26,6 +26,7 @@ void scene_options_default(scene_options *options) {
     options->integrator = (int)desc.integrator;
     options->sharp = desc.sharp_gradients;
     options->projection = desc.projection;
+    options->rates = desc.rates;
     options->laplacian = (double)desc.incompressible.laplacian;
     options->frames = 20;
     options->output = "";
@@ -69,6 +70,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = choice("volume", &o->volume_coupling, "split|printed", "how an evolved J enters the energy");
     table[i++] = choice("conduction", &o->conduction, "compact|double", "heat conduction's stencil");
     table[i++] = choice("integrator", &o->integrator, "rk2|ssprk3|rk3frozen|rk4frozen|leapfrog", "time integrator");
+    table[i++] = whole("rates", &o->rates, 1, 8, "leapfrog: most step sizes, for stiff and fine parts of their own");
     table[i++] = whole("conduction-stages", &o->conduction_stages, 0, 1000, "3 or more: conduction in stages of its own");
     table[i++] = whole("sharp", &o->sharp, 0, 1, "1: gradients of fourth-order dispersion (lattices only)");
     table[i++] = whole("projection", &o->projection, 0, 1, "1: conserve angular momentum exactly (000-79 to 82)");
@@ -136,6 +138,7 @@ void scene_options_apply(const scene_options *options, tlsph_desc *desc) {
     desc->conduction = (tlsph_conduction)options->conduction;
     desc->integrator = (tlsph_integrator)options->integrator;
     desc->conduction_stages = options->conduction_stages;
+    desc->rates = options->rates;
     desc->sharp_gradients = options->sharp;
     desc->projection = options->projection;
     desc->scheme = (tlsph_scheme)options->scheme;

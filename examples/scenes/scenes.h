@@ -26,7 +26,7 @@ typedef struct scene_options {
     double cfl, support, harmonic, biharmonic;
     int unknowns, thermal, operator_kind, kernel, dissipation, volume_coupling, conduction, integrator;
     int force_form, step_rule, placement;
-    int conduction_stages, sharp, projection, audit, threads;
+    int conduction_stages, sharp, projection, audit, threads, rates;
     int preset;                  /* as named on the command line, 0: none; drivers apply it before the other options */
     int scheme, pressure_iteration, laplacian_as_printed; /* TLSPH_INCOMPRESSIBLE: unknowns lose their J */
     double laplacian;
@@ -34,7 +34,7 @@ typedef struct scene_options {
     const char *output;
 } scene_options;
 
-#define SCENE_OPTION_COUNT 29
+#define SCENE_OPTION_COUNT 30
 
 /* The library's own defaults, no end time, one frame. */
 void scene_options_default(scene_options *options);
