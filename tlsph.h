@@ -441,9 +441,9 @@ typedef struct tlsph_desc {
                                             keep their energy to a percent or two, where retries alone may miss all of
                                             it. Nothing is given up but time; counted in the ledger */
     int audit;                           /* 1: record the least pair entropy production in the ledger; default 0 */
-    int keep_pairs;                      /* 1: tlsph_operator_view shows neighbours and vectors. Default 0: they are kept
-                                            only where the scene itself reads them pair by pair; in most, tiles of equal
-                                            patterns are all that is left of them, half of the memory at 26 neighbours */
+    int keep_pairs;                      /* 1: tlsph_operator_view shows neighbours and vectors. Default 0: only where
+                                            the scene itself reads them pair by pair; else tiles of equal patterns are
+                                            all that is kept of them, which halves the memory at 26 neighbours */
     int threads;                         /* OpenMP builds: number of threads, 0 = OpenMP's own choice */
     tlsph_run_fn run;                    void *run_user;          /* the host's threads; NULL: OpenMP, else serial */
     tlsph_allocator allocator;           /* zero: TLSPH_MALLOC and TLSPH_FREE */
@@ -4430,7 +4430,7 @@ static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tls
 static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *force, tlsph_real *Z) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, a = h->particle;
-    tlsph_real P[9], A[9], H[9], c[3], damping[3], wave[3], column[3] = {0, 0, 0}, even[3], moment[9] = {0};
+    tlsph_real P[9], A[9], H[9], c[3] = {0}, damping[3], wave[3], column[3] = {0}, even[3], moment[9] = {0};
     tlsphi_stress_behind(s, h, P);
     tlsphi_row_get(s, s->rows.A, dim * dim, a, A);
     tlsphi_row_get(s, s->rows.wave, 3, a, wave);
@@ -4566,17 +4566,18 @@ TLSPHI_INLINE void tlsphi_contract(const int n, const tlsph_real *row, const tls
     for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] *= scale[l];
 }
 /* The particles first to last of a tile: n components of each become lanes. */
-TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, size_t first, size_t last, tlsph_real *to) {
+TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, size_t first, size_t last,
+                                     tlsph_real *to) {
     if (last - first == TLSPHI_LANES) tlsphi_transpose(from, n, to);
     else
         for (size_t l = first; l < last; l++)
             for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
 }
-/* w = v - spin x (x - centre) - mean, to its rows, and grad w = grad v - spin x F in place of G = grad v. As F is the gradient
-   of x this saves a gather; it sees x and F of the stage, which is as exact for rigid and affine motions, but where forces
-   take torques about x_next it is not their adjoint to the last digit: scenes with E or eta gather grad w. */
-TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *body, size_t base, size_t first, size_t last,
-                                    const int dim, tlsph_real *G) {
+/* w = v - spin x (x - centre) - mean, to its rows, and grad w = grad v - spin x F in place of G = grad v. As F is the
+   gradient of x this saves a gather; it sees x and F of the stage, which is as exact for rigid and affine motions, but
+   where forces take torques about x_next it is not their adjoint to the last digit: scenes with E or eta gather grad w. */
+TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *body, size_t base, size_t first,
+                                    size_t last, const int dim, tlsph_real *G) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *x = s->linear ? s->X : s->now.x, *v = tlsphi_at(s, s->rows.v, base);
     tlsph_real arm[3 * TLSPHI_LANES_MOST] = {0}, F[9 * TLSPHI_LANES_MOST] = {0}, w[3 * TLSPHI_LANES_MOST];
@@ -8611,8 +8612,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     }
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
-    s->keeps_pairs = d->keep_pairs || !s->lanes || s->sharp || s->incompressible || s->step_rule != TLSPH_STEP_BY_PARTICLE ||
-                     (s->conducts && d->conduction_stages) || d->particles.moments;
+    s->keeps_pairs = d->keep_pairs || !s->lanes || s->sharp || s->incompressible || d->particles.moments ||
+                     s->step_rule != TLSPH_STEP_BY_PARTICLE || (s->conducts && d->conduction_stages);
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
 }
