@@ -220,7 +220,7 @@ static void read_desc(reader *r, tlsph_desc *d)
     d->operator_kind = byte(r) % 2 ? TLSPH_CORRECTED_KERNEL : (tlsph_operator_kind)choice(r, TLSPH_CLOSED + 1);
     d->kernel = (tlsph_kernel)choice(r, TLSPH_WENDLAND_C4 + 1);
     if (byte(r) % 2) d->support = number(r, 0.3, 1.5);
-    d->dissipation = (tlsph_dissipation)choice(r, TLSPH_NO_DISSIPATION + 1);
+    d->dissipation = (tlsph_dissipation)choice(r, TLSPH_SELF_ADJOINT + 1);
     d->conduction = (tlsph_conduction)choice(r, 2);
     d->volume_coupling = (tlsph_volume_coupling)choice(r, 2);
     d->integrator = (tlsph_integrator)choice(r, TLSPH_LEAPFROG + 1);

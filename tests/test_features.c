@@ -571,7 +571,7 @@ static void thermal_body(body *b, int thermal) {
 
 TEST(every_dissipation_runs) {
     int kind, thermal, dimension;
-    for (kind = TLSPH_LIMITED; kind <= TLSPH_NO_DISSIPATION; kind++)
+    for (kind = TLSPH_LIMITED; kind <= TLSPH_SELF_ADJOINT; kind++)
         for (thermal = 0; thermal < 3; thermal++)
             for (dimension = 2; dimension <= 3; dimension++) {
                 char name[64];

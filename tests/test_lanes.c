@@ -105,8 +105,9 @@ TEST(leapfrog)
 }
 TEST(other_dissipations)
 {
-    static const tlsph_dissipation kinds[] = { TLSPH_RECONSTRUCTED, TLSPH_FIRST_ORDER, TLSPH_NO_DISSIPATION };
-    for (int i = 0; i < 3; i++) {
+    static const tlsph_dissipation kinds[] = { TLSPH_RECONSTRUCTED, TLSPH_FIRST_ORDER, TLSPH_NO_DISSIPATION,
+                                               TLSPH_SELF_ADJOINT, TLSPH_SELF_ADJOINT };
+    for (int i = 0; i < 5; i++) {
         moving_block s = body(2 + i % 2, 0);
         s.dissipation = kinds[i];
         compare_all(s, 0.5);

@@ -62,7 +62,7 @@ void scene_option_table(scene_options *o, ex_option *table) {
     table[i++] = choice("kernel", &o->kernel, "cubic|quadratic|wendland2|wendland4", "of the operators with kernels");
     table[i++] = choice("placement", &o->placement, "faces|cells", "of clouds: particles on their surface, or all behind it");
     table[i++] = real("support", &o->support, "spacings", 0.5, 4, "smoothing length h; neighbours within 2h");
-    table[i++] = choice("dissipation", &o->dissipation, "limited|reconstructed|first|printed|jst|none", "upwinding");
+    table[i++] = choice("dissipation", &o->dissipation, "limited|reconstructed|first|printed|jst|none|adjoint", "upwinding");
     table[i++] = real("harmonic", &o->harmonic, "", 0, 100, "eta2 of the dissipation jst (002-28)");
     table[i++] = real("biharmonic", &o->biharmonic, "", 0, 100, "eta4 of the dissipation jst (002-28)");
     table[i++] = choice("force", &o->force_form, "adjoint|printed", "forces of W0, W1, bonds (printed: 002-22)");
