@@ -808,7 +808,8 @@ TLSPH_API tlsph_result tlsph_material_check(const tlsph_material *material, doub
                                             tlsph_material_report *report, tlsph_error *error);
 /* Dissipative fluxes into side a of one pair: C, c reference and current area vectors (C_ab^skew, c_ab^skew, m^2),
    d = X_b - X_a (m), a_J the factor of the J dissipation (0 where J is not evolved). production >= 0 is the power turned
-   into heat, half of it on each side. Source: METHOD section "Dissipation", 000 (66)-(76). */
+   into heat, half of it on each side. TLSPH_SELF_ADJOINT: the pair's own part, without that of its stress. Source: METHOD
+   section "Dissipation", 000 (66)-(76). */
 TLSPH_API void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_side *a, const tlsph_pair_side *b,
                                       const tlsph_real C[3], const tlsph_real c[3], const tlsph_real d[3], tlsph_real a_J,
                                       tlsph_pair_flux *out);
@@ -2263,8 +2264,8 @@ static void tlsphi_join(uint32_t *parent, uint32_t a, uint32_t b) {
 
 static void tlsphi_closed_moment(const tlsphi_plan *plan, size_t a, double A[9]); /* [CLOSURE] */
 
+static int tlsphi_owns_surface(const tlsph_desc *d, size_t a);                    /* [VALIDATION] */
 /* M_a = V (V I - T)^-1 for particles behind the surface; A: the operator's own V I - T. */
-static int tlsphi_owns_surface(const tlsph_desc *d, size_t a); /* [VALIDATION] */
 static tlsph_result tlsphi_correct_closed(tlsphi_plan *plan, size_t a, const double A[9]) {
     const double V = tlsphi_plan_volume(plan, a);
     const size_t dd = (size_t)(plan->dim * plan->dim);
@@ -3702,6 +3703,18 @@ TLSPHI_INLINE size_t tlsphi_tile_end(const tlsphi_block *block, size_t a) {
 }
 TLSPHI_INLINE tlsph_real *tlsphi_theta(const tlsph_solver *s, size_t a) { return tlsphi_at(s, s->rows.theta, a); }
 
+/* First entry of a particle >= a in a list sorted by particle, whose entries of `size` bytes begin with its number. */
+static size_t tlsphi_find_particle(const void *list, size_t count, size_t size, size_t a) {
+    size_t low = 0, high = count;
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        uint32_t particle;
+        memcpy(&particle, (const unsigned char *)list + size * middle, sizeof particle);
+        if (particle < a) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
 /* Runs task(arg, i) for every block i. */
 static void tlsphi_run_tasks(const tlsph_solver *s, tlsph_task_fn task, void *arg) {
     tlsphi_parallel(s->run, s->run_user, s->threads, task, arg, s->blocks);
@@ -4381,13 +4394,7 @@ static tlsph_real tlsphi_share_behind(const tlsph_solver *s, size_t a, size_t k,
 }
 /* The first held part of a particle >= a. */
 static tlsphi_held_part *tlsphi_find_held_part(const tlsph_solver *s, size_t a) {
-    size_t low = 0, high = s->held_parts;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        if (s->held_part[middle].particle < a) low = middle + 1;
-        else high = middle;
-    }
-    return s->held_part + low;
+    return s->held_part + tlsphi_find_particle(s->held_part, s->held_parts, sizeof *s->held_part, a);
 }
 /* S v */
 static void tlsphi_held_components(int dim, const tlsphi_held_part *h, tlsph_real *v) {
@@ -4791,13 +4798,7 @@ static void tlsphi_image_forces(tlsph_solver *s) {
 }
 /* First image of a particle >= a. */
 static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
-    size_t low = 0, high = s->images;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        if (s->image[middle].particle < a) low = middle + 1;
-        else high = middle;
-    }
-    return s->image + low;
+    return s->image + tlsphi_find_particle(s->image, s->images, sizeof *s->image, a);
 }
 /* dF/dt = grad w + spin x F: exact for turns where grad x is F only to the slack of TLSPH_CLOSED. P does no work on the
    second part. */

@@ -106,6 +106,7 @@ static void list_cases(bench *b) {
         }
     add_case(b, TLSPH_PFHJ, 6, "_first_order")->dissipation = TLSPH_FIRST_ORDER;
     add_case(b, TLSPH_PFHJ, 6, "_no_dissipation")->dissipation = TLSPH_NO_DISSIPATION;
+    add_case(b, TLSPH_PFHJ, 6, "_self_adjoint")->dissipation = TLSPH_SELF_ADJOINT;
     add_case(b, TLSPH_PFHJ, 6, "_sharp")->sharp = 1;
     add_case(b, TLSPH_PFHJ, 6, "_no_projection")->projection = 0;
     add_case(b, TLSPH_PFHJ, 4, "_2d")->dimension = 2; /* the same supports as 6 and 26 neighbours in 3-D */

@@ -151,6 +151,13 @@ void own_cloud_destroy(own_cloud *cloud)
 
 /* ---- scenes ---- */
 
+void closed_operator(tlsph_desc *desc)
+{
+    desc->operator_kind = TLSPH_CLOSED;
+    desc->kernel = TLSPH_WENDLAND_C2;
+    desc->support = R(0.825);
+}
+
 tlsph_material soft_material(tlsph_material_kind kind)
 {
     tlsph_material m = tlsph_material_default(kind);

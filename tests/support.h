@@ -62,6 +62,8 @@ moving_block moving_block_default(void);
 tlsph_result moving_block_create(const moving_block *s, tlsph_solver **solver, tlsph_error *error);
 /* Writes a smooth initial velocity, `speed` m/s at most. */
 tlsph_result moving_block_kick(tlsph_solver *solver, double speed);
+/* The closed operator with the kernel and support that suit irregular clouds. */
+void closed_operator(tlsph_desc *desc);
 /* A rubber-like material with all thermal constants set. */
 tlsph_material soft_material(tlsph_material_kind kind);
 

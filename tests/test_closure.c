@@ -1,5 +1,6 @@
 /* Voronoi volumes and areas, surfaces, and the closed operator for irregular clouds. */
 #include "physics.h"
+#include "support.h"
 
 static tlsph_fill cloud_fill(int dimension, tlsph_shape shape, double cells, double jitter)
 {
@@ -20,9 +21,7 @@ static tlsph_desc closed_desc(int dimension, const tlsph_particles *particles, c
     desc.particles = *particles;
     desc.materials = material;
     desc.material_count = 1;
-    desc.operator_kind = TLSPH_CLOSED;
-    desc.kernel = TLSPH_WENDLAND_C2;
-    desc.support = R(0.825);
+    closed_operator(&desc);
     desc.keep_pairs = 1;
     desc.threads = 1;
     return desc;

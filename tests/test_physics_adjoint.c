@@ -63,9 +63,7 @@ static void balances(double jitter, tlsph_thermal thermal, tlsph_unknowns unknow
     desc.dissipation = TLSPH_SELF_ADJOINT;
     desc.audit = 1;
     if (jitter > 0) {
-        desc.operator_kind = TLSPH_CLOSED;
-        desc.kernel = TLSPH_WENDLAND_C2;
-        desc.support = R(0.825);
+        closed_operator(&desc);
     }
     REQUIRE_OK(tlsph_create(&desc, &solver, NULL));
     const size_t n = tlsph_count(solver);

@@ -1,5 +1,6 @@
 /* Clouds whose particles lie behind their surface: the cells' moments, balances with every condition, convergence. */
 #include "physics.h"
+#include "support.h"
 
 /* ---- the cells ---- */
 
@@ -284,9 +285,7 @@ TEST(refusals_behind_the_surface)
         desc.particles = cloud.particles;
         desc.materials = &material;
         desc.material_count = 1;
-        desc.operator_kind = TLSPH_CLOSED;
-        desc.kernel = TLSPH_WENDLAND_C2;
-        desc.support = R(0.825);
+        closed_operator(&desc);
         desc.threads = 1;
         desc.conditions = &condition;
         desc.condition_count = 1;
@@ -314,9 +313,7 @@ TEST(refusals_behind_the_surface)
     desc.particles = cloud.particles;
     desc.materials = &material;
     desc.material_count = 1;
-    desc.operator_kind = TLSPH_CLOSED;
-    desc.kernel = TLSPH_WENDLAND_C2;
-    desc.support = R(0.825);
+    closed_operator(&desc);
     CHECK(tlsph_create(&desc, &solver, NULL) != TLSPH_OK);
     tlsph_destroy(solver);
     tlsph_cloud_destroy(&cloud);

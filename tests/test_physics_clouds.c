@@ -1,5 +1,6 @@
 /* Irregular clouds in motion: exact modes of free bodies, invariance. */
 #include "physics.h"
+#include "support.h"
 
 /* ---- exact modes with free surfaces ---- */
 
@@ -110,9 +111,7 @@ TEST(renumbered_clouds_agree)
         desc.particles.weights = V + n;
         desc.materials = &material;
         desc.material_count = 1;
-        desc.operator_kind = TLSPH_CLOSED;
-        desc.kernel = TLSPH_WENDLAND_C2;
-        desc.support = R(0.825);
+        closed_operator(&desc);
         desc.threads = 1;
         REQUIRE_OK(tlsph_create(&desc, &solver, NULL));
         v[k] = scene_read(solver, TLSPH_FIELD_VELOCITY);

@@ -1,5 +1,6 @@
 /* Irregular clouds in boxes, in bodies by signed distance and in closed surfaces. */
 #include "physics.h"
+#include "support.h"
 
 typedef struct body { double area, volume; tlsph_length_fn distance; } body;
 
@@ -77,9 +78,7 @@ static void check_cloud(const tlsph_fill *fill, double volume, double area, doub
     desc.particles = cloud.particles;
     desc.materials = &material;
     desc.material_count = 1;
-    desc.operator_kind = TLSPH_CLOSED;
-    desc.kernel = TLSPH_WENDLAND_C2;
-    desc.support = R(0.825);
+    closed_operator(&desc);
     desc.threads = 1;
     if (!CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_OK)) REPORT("%s", error.message);
     else tlsph_destroy(solver);
