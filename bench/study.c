@@ -30,6 +30,8 @@ static const choice choices[] = {
     { "E", "", "E", ON_ISOTHERMAL }, { "eta", "", "entropy instead of E", ON_THERMAL },
     { "unprojected", "", "no projection", ON_ALL },
     { "first", "", "no reconstruction", ON_ALL }, { "unlimited", "", "no limiter", ON_ALL },
+    { "adjoint", "", "self-adjoint reconstruction", ON_ALL },
+    { "ssprk3 adjoint", "ssprk3", "self-adjoint, SSP RK3", ON_ALL },
     { "undamped", "", "no dissipation", ON_ALL }, { "jst", "", "JST dissipation", ON_ALL },
     { "26", "", "26 neighbours, quadratic kernel", ON_ALL },
     { "26 cubic", "26", "cubic for quadratic kernel", ON_ALL }, { "26 wendland", "26", "Wendland C2 for quadratic kernel", ON_ALL },
@@ -46,11 +48,12 @@ static const choice in_float[] = { { "", "", "float", ON_ALL }, { "26", "26", "f
 enum { CHOICES = sizeof choices / sizeof *choices, IN_FLOAT = sizeof in_float / sizeof *in_float };
 
 /* Run at several resolutions for the fronts; the full study crosses operators, steps, dissipation and unknowns. */
-static const char *const candidates[] = { "", "fast", "balanced", "accurate", "sharp rk3 split", "sharp rk4 split" };
+static const char *const candidates[] = { "", "fast", "balanced", "accurate", "sharp rk3 split", "sharp rk4 split",
+                                          "adjoint", "ssprk3 adjoint" };
 enum { CANDIDATES = sizeof candidates / sizeof *candidates };
 static const char *const operators[] = { "", "sharp", "cells4", "26", "26 cubic" };
 static const char *const integrators[] = { "", "ssprk3", "rk3", "rk4", "leapfrog" };
-static const char *const dissipations[] = { "", "unlimited", "first" };
+static const char *const dissipations[] = { "", "unlimited", "first", "adjoint" };
 static const char *const unknowns[] = { "", "J", "HJ" };
 
 static int applies(const choice *c, study_scene scene) {
@@ -87,10 +90,11 @@ static void visit_cross(FILE *file, study_scene scene, int n) {
     const int all = scene == STUDY_CUBE && n < study_scenes[scene].n[2]; /* elsewhere the dissipation is left limited */
     for (int o = 0; o < 5; o++)
         for (int i = 0; i < 5; i++)
-            for (int d = 0; d < (all ? 3 : 1); d++)
+            for (int d = 0; d < (all ? 4 : 1); d++)
                 for (int u = 0; u < 3; u++) {
                     char text[64];
                     if (!strcmp(operators[o], "cells4") && i < 1) continue; /* two stages amplify it */
+                    if (d == 3 && (i > 1 || o == 1 || o == 2)) continue; /* refused, see tlsph_dissipation */
                     if (!all && u == 1) continue;
                     snprintf(text, sizeof text, "%s %s %s %s", operators[o], integrators[i], dissipations[d], unknowns[u]);
                     for (char *at = text; *at;) /* single blanks between words, none at the ends */
