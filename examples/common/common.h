@@ -172,7 +172,7 @@ typedef struct {
     int colour; /* palette index */
 } ex_curve;
 
-#define EX_NOTE 4 /* markers with the name to the lower left of each instead of in the legend */
+#define EX_NOTE 4 /* markers with the name beside each instead of in the legend */
 
 typedef struct {
     const char *title, *x_label, *y_label;

@@ -2,6 +2,7 @@
 #include "picture.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +19,15 @@ typedef struct {
     int log, automatic;
 } range;
 
+/* The name of a point and where it stands. */
+typedef struct {
+    const char *name;
+    double at[2];
+    ex_box box;
+} note;
+
+enum { NOTES = 64 };
+
 typedef struct {
     ex_image *page, fine; /* fine: FINE times the size of the chart */
     const ex_axes *axes;
@@ -28,6 +38,8 @@ typedef struct {
     ex_ticks x_ticks, y_ticks;
     ex_box frame; /* relative to (x0, y0), like all coordinates below */
     ex_box legend;
+    note notes[NOTES];
+    int note_count;
 } chart;
 
 /* ---- ticks -------------------------------------------------------------- */
@@ -192,14 +204,11 @@ static int line_meets(const ex_box *b, const double from[2], const double to[2])
     return first <= last;
 }
 
-/* Where the name of a note stands: to the lower left of its point, or to the right where that would leave the frame. */
-static ex_box note_box(const chart *c, const ex_curve *curve, const double at[2]) {
-    const double width = ex_label_width(0.8 * c->size, curve->name), gap = 4 * c->size;
-    const double left = at[0] - gap - width > c->frame.left ? at[0] - gap - width : at[0] + gap;
-    return (ex_box){ left, at[1] + 1 * c->size, left + width, at[1] + 10 * c->size };
+static int overlap(const ex_box *a, const ex_box *b) {
+    return a->left < b->right && a->right > b->left && a->top < b->bottom && a->bottom > b->top;
 }
 
-/* Long curves are sampled; it is only about the place of the legend. */
+/* Long curves are sampled; it is only about the places of texts. */
 static int points_covered(const chart *c, const ex_box *b) {
     int hits = 0;
     for (int i = 0; i < c->count; i++) {
@@ -211,15 +220,19 @@ static int points_covered(const chart *c, const ex_box *b) {
             int ok = place_point(c, curve, j, at);
             if (ok && joined && curve->style != 2 && curve->style != EX_NOTE) hits += line_meets(b, last, at);
             else if (ok) hits += inside(b, at);
-            if (ok && curve->style == EX_NOTE && curve->name) {
-                const ex_box n = note_box(c, curve, at);
-                hits += n.left < b->right && n.right > b->left && n.top < b->bottom && n.bottom > b->top;
-            }
             if (ok) memcpy(last, at, sizeof last);
             joined = ok;
         }
     }
     return hits;
+}
+
+/* Places for the name of a note, from the nearest on: left or right of its point, below or above. */
+static ex_box note_place(const chart *c, const char *name, const double at[2], int i) {
+    const double g = c->size, width = ex_label_width(0.8 * g, name), away = 3 * (i / 4);
+    const double left = i % 2 ? at[0] + 4 * g : at[0] - 4 * g - width;
+    const double top = at[1] + g * (i % 4 < 2 ? 1 + away : -10 - away);
+    return (ex_box){ left, top, left + width, top + 9 * g };
 }
 
 static int in_legend(const ex_curve *curve) { return curve->name && curve->style != EX_NOTE; }
@@ -253,6 +266,39 @@ static int place_legend(chart *c) {
         c->legend = (ex_box){ floor(x), floor(y), floor(x + width), floor(y + height) };
     }
     return least > 0 ? least : 0;
+}
+
+/* Within the frame, off the legend and earlier notes; the nearer the better, and the fewer points are hidden. */
+static void place_note(chart *c, note *n) {
+    const ex_box *f = &c->frame;
+    const double rim = 3 * c->size;
+    int least = INT_MAX;
+    n->box = note_place(c, n->name, n->at, 0);
+    for (int i = 0; i < 64; i++) {
+        const ex_box b = note_place(c, n->name, n->at, i);
+        const ex_box wide = { b.left - rim, b.top - rim, b.right + rim, b.bottom + rim };
+        int cost = i / 4, off = b.left > f->left && b.right < f->right && b.top > f->top && b.bottom < f->bottom;
+        off = off && !overlap(&b, &c->legend);
+        for (const note *other = c->notes; other < n && off; other++) off = !overlap(&b, &other->box);
+        if (off && cost < least) cost += 3 * points_covered(c, &wide);
+        if (!off || cost >= least) continue;
+        least = cost;
+        n->box = b;
+    }
+}
+
+static void place_notes(chart *c) {
+    for (int i = 0; i < c->count; i++) {
+        const ex_curve *curve = &c->curves[i];
+        if (curve->style != EX_NOTE || !curve->name) continue;
+        for (size_t j = 0; j < curve->count && c->note_count < NOTES; j++) {
+            note *n = &c->notes[c->note_count];
+            if (!place_point(c, curve, j, n->at) || !inside(&c->frame, n->at)) continue;
+            n->name = curve->name;
+            place_note(c, n);
+            c->note_count++;
+        }
+    }
 }
 
 /* Makes room above the curves when the legend fits nowhere between them. */
@@ -338,6 +384,16 @@ static void draw_curve(chart *c, const ex_curve *curve) {
     }
 }
 
+/* From a point to its name, where that stands apart. */
+static void draw_leads(chart *c) {
+    static const double grey[3] = { 150, 150, 150 };
+    for (const note *n = c->notes; n < c->notes + c->note_count; n++) {
+        const int below = n->box.top > n->at[1];
+        const double to[2] = { n->box.left > n->at[0] ? n->box.left : n->box.right, below ? n->box.top : n->box.bottom };
+        if (fabs(to[1] - n->at[1]) > 3 * c->size) fine_line(c, &c->frame, n->at, to, 0.3 * c->size, grey);
+    }
+}
+
 static double tick_place(const chart *c, int is_y, double value) {
     const ex_box *f = &c->frame;
     const range *r = is_y ? &c->y : &c->x;
@@ -390,8 +446,11 @@ static void put_text(const chart *c, double x, double y, int align, int upward, 
     ex_label(c->page, c->x0 + x, c->y0 + y, c->size, align, upward, text);
 }
 
-static void put_note(const chart *c, const ex_box *b, const char *text) {
-    ex_label(c->page, c->x0 + b->left, c->y0 + (b->top + b->bottom) / 2, 0.8 * c->size, EX_LEFT, 0, text);
+static void draw_notes(const chart *c) {
+    for (const note *n = c->notes; n < c->notes + c->note_count; n++) {
+        const double y = c->y0 + (n->box.top + n->box.bottom) / 2;
+        ex_label(c->page, c->x0 + n->box.left, y, 0.8 * c->size, EX_LEFT, 0, n->name);
+    }
 }
 
 static void draw_tick_texts(const chart *c) {
@@ -428,39 +487,16 @@ static void draw_legend_texts(const chart *c) {
     }
 }
 
-/* Notes that would cover an earlier one move down. */
-static void draw_notes(const chart *c) {
-    enum { NOTES = 64 };
-    ex_box taken[NOTES];
-    int count = 0;
-    for (int i = 0; i < c->count; i++) {
-        const ex_curve *curve = &c->curves[i];
-        double at[2];
-        if (curve->style != EX_NOTE || !curve->name) continue;
-        for (size_t j = 0; j < curve->count; j++) {
-            ex_box b;
-            if (!place_point(c, curve, j, at) || !inside(&c->frame, at)) continue;
-            b = note_box(c, curve, at);
-            for (int k = 0; k < count; k++) {
-                const double below = taken[k].bottom - b.top;
-                if (b.left >= taken[k].right || b.right <= taken[k].left || b.top >= taken[k].bottom || b.bottom <= taken[k].top) continue;
-                b.top += below; b.bottom += below;
-                k = -1;
-            }
-            if (count < NOTES) taken[count++] = b;
-            put_note(c, &b, curve->name);
-        }
-    }
-}
-
 static int draw_chart(chart *c) {
     int smaller = c->width < c->height ? c->width : c->height;
     ex_box border;
     c->size = fmin(fmax(smaller / 290.0, 1.0), 4.0);
     arrange(c);
+    place_notes(c);
     if (ex_image_create(&c->fine, c->width * FINE, c->height * FINE)) return 1;
     draw_grid(c, 0);
     draw_grid(c, 1);
+    draw_leads(c);
     for (int i = 0; i < c->count; i++) draw_curve(c, &c->curves[i]);
     draw_legend_samples(c);
     ex_shrink_into(c->page, c->x0, c->y0, &c->fine, FINE);
