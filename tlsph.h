@@ -652,7 +652,8 @@ typedef struct tlsph_preflight_report {
     double spacing_least, spacing_most; /* tau, m */
     double time_step, steps;            /* s; steps to the end time if the state does not stiffen */
     double crossings;                   /* times that sound crosses the longest body till then */
-    double pair_visits;                 /* pairs x stages x steps: cost, to be multiplied by the bench's time a pair */
+    double pair_visits;                 /* pairs x stages x steps, with `rates` x passes: cost, to be multiplied by the
+                                           bench's time a pair */
 } tlsph_preflight_report;
 
 /* Both sides of a pair for tlsph_pair_dissipation. 3-D; tensors row-major. */
@@ -11092,6 +11093,20 @@ static int tlsphi_overdamps(const tlsph_solver *s) {
     }
     return over;
 }
+/* Times that forces are gathered over pairs in a step. A pass of [MULTI-RATE] takes its level and what that touches. */
+static double tlsphi_survey_visits(const tlsph_solver *s) {
+    const tlsphi_rates *rates = &s->rates;
+    double visits = 0;
+    if (rates->levels < 2) return (double)s->pairs * tlsphi_schemes[s->integrator].stages;
+    for (int l = 0; l < rates->levels; l++) {
+        const size_t *first = rates->first + 2 * l;
+        for (size_t i = first[0]; first[0] < first[1] && i < first[2]; i++) {
+            const tlsphi_block *block = s->block + rates->list[i];
+            visits += (double)(s->first[block->end] - s->first[block->begin]) * (1 << l);
+        }
+    }
+    return visits;
+}
 TLSPHI_DEF void tlsph_preflight(const tlsph_solver *s, tlsph_real end_time, tlsph_preflight_report *r) {
     memset(r, 0, sizeof *r);
     const double end = (double)end_time, sound_step = tlsphi_survey_particles(s, r);
@@ -11105,13 +11120,13 @@ TLSPHI_DEF void tlsph_preflight(const tlsph_solver *s, tlsph_real end_time, tlsp
     r->crossings = sound_step < TLSPHI_LARGEST
                        ? tlsphi_dmax(end - s->time, 0) * (double)s->cfl * r->spacing_least / (sound_step * length)
                        : 0;
-    r->pair_visits = (double)s->pairs * tlsphi_schemes[s->integrator].stages * r->steps;
+    r->pair_visits = tlsphi_survey_visits(s) * r->steps;
     tlsphi_hint(r, TLSPH_HINT_WEAK_SUPPORT, r->support < 0.1);
     tlsphi_hint(r, TLSPH_HINT_IRREGULAR, tlsphi_is_irregular(s));
     for (size_t i = 0; i < s->material_count && !s->has_J; i++) /* kappa/mu at nu = 0.49 */
         tlsphi_hint(r, TLSPH_HINT_INCOMPRESSIBLE, s->materials[i].kappa > TLSPHI_R(49.7) * s->materials[i].mu);
     tlsphi_hint(r, TLSPH_HINT_CFL, s->cfl > tlsph_cfl_limit(s->integrator) || tlsphi_overdamps(s));
-    tlsphi_hint(r, TLSPH_HINT_SMALL_PARTICLES, r->spacing_least < 0.1 * r->spacing_most);
+    tlsphi_hint(r, TLSPH_HINT_SMALL_PARTICLES, s->rates.levels < 2 && r->spacing_least < 0.1 * r->spacing_most);
     tlsphi_hint(r, TLSPH_HINT_DIFFUSION, r->time_step < 0.5 * sound_step && s->conducts);
     tlsphi_hint(r, TLSPH_HINT_UNITS_TIME, end > 0 && (end < r->time_step || r->steps > 1e8));
     for (size_t i = 0; i < s->loads; i++)

@@ -75,6 +75,94 @@ TEST(figures_of_a_block)
     tlsph_destroy(solver);
 }
 
+/* ---- multi-rate steps ---- */
+
+/* A stress-free material that counts how often each particle is evaluated. */
+typedef struct counted { tlsph_real modulus; int *calls; } counted;
+
+static void count_calls(void *user, size_t count, const uint32_t *particle, const tlsph_real *F, const tlsph_real *J,
+                        tlsph_response *out)
+{
+    const counted *c = user;
+    (void)F, (void)J;
+    memset(out, 0, count * sizeof *out);
+    for (size_t i = 0; i < count; i++) {
+        out[i].p_modulus[0] = out[i].s_modulus[0] = c->modulus;
+        c->calls[particle[i]]++;
+    }
+}
+/* Visits of pairs by a step in which particle a is evaluated for calls[a] - 1 passes, and once at the end: each takes
+   part in its own passes and in those of levels that its neighbours have. */
+static double visits_of(const tlsph_operator *view, const int *calls)
+{
+    double visits = 0;
+    for (size_t a = 0; a < view->count; a++) {
+        int passes = calls[view->host[a]] - 1, seen[16] = {0}, sum = passes;
+        seen[passes] = 1;
+        for (size_t k = view->first[a]; k < view->first[a + 1]; k++) {
+            passes = calls[view->host[view->neighbours[k]]] - 1;
+            sum += seen[passes] ? 0 : passes;
+            seen[passes] = 1;
+        }
+        visits += (double)(view->first[a + 1] - view->first[a]) * sum;
+    }
+    return visits;
+}
+/* A layer whose sound is 4 times as fast between two others, or all the same. One level beside particles, not two: blocks
+   may hold particles beside either, and visit for all what one of them needs. */
+static void check_visits(int layered, int levels)
+{
+    const int cells[3] = {11, 3, 3}, n = 12 * 4 * 4;
+    int calls[12 * 4 * 4] = {0}, least = 100, most = 0;
+    uint8_t of[12 * 4 * 4];
+    counted count[2];
+    tlsph_material materials[2];
+    tlsph_desc desc = tlsph_desc_default(3);
+    tlsph_preflight_report r = {0};
+    tlsph_operator view;
+    tlsph_solver *solver;
+    own_cloud cloud;
+    if (!CHECK(own_box(&cloud, 3, cells, 0.1, 0))) return;
+    for (int m = 0; m < 2; m++) {
+        materials[m] = soft_material(TLSPH_USER);
+        materials[m].young *= R(m && layered ? 16 : 1);
+        materials[m].response = count_calls;
+        materials[m].response_user = count + m;
+        count[m].modulus = materials[m].young;
+        count[m].calls = calls;
+    }
+    for (int a = 0; a < n; a++) of[a] = fabs((double)cloud.particles.positions[3 * a] - 0.6) < 0.25;
+    desc.particles = cloud.particles;
+    desc.particles.materials = of;
+    desc.materials = materials;
+    desc.material_count = 2;
+    desc.integrator = TLSPH_LEAPFROG;
+    desc.rates = 8;
+    desc.keep_pairs = 1;
+    if (CHECK_RESULT(tlsph_create(&desc, &solver, NULL), TLSPH_OK)) {
+        const double dt = (double)tlsph_stable_time_step(solver);
+        tlsph_preflight(solver, R(0.5 * dt), &r);
+        tlsph_operator_view(solver, &view);
+        memset(calls, 0, sizeof calls);
+        CHECK_RESULT(tlsph_step(solver, R(dt)), TLSPH_OK);
+        for (int a = 0; a < n; a++) {
+            least = calls[a] < least ? calls[a] : least;
+            most = calls[a] > most ? calls[a] : most;
+        }
+        CHECK_SAME(least, 2);
+        CHECK_SAME(most, (1 << (levels - 1)) + 1);
+        CHECK_SAME(r.pair_visits, visits_of(&view, calls));
+        CHECK_SAME(r.steps, 1);
+        tlsph_destroy(solver);
+    }
+    own_cloud_destroy(&cloud);
+}
+TEST(visits_of_multi_rate_steps)
+{
+    check_visits(0, 1);
+    check_visits(1, 3);
+}
+
 TEST(every_hint_has_its_reason)
 {
     const struct { trial t; unsigned expected; } rows[] = {
@@ -151,5 +239,5 @@ TEST(weak_support_is_named)
     CHECK(!strcmp(tlsph_hint_text((tlsph_hint)TLSPH_HINT_COUNT), "no such hint"));
 }
 
-SUITE(preflight, ENTRY(figures_of_a_block), ENTRY(every_hint_has_its_reason), ENTRY(bodies_are_told_apart),
-      ENTRY(weak_support_is_named))
+SUITE(preflight, ENTRY(figures_of_a_block), ENTRY(visits_of_multi_rate_steps), ENTRY(every_hint_has_its_reason),
+      ENTRY(bodies_are_told_apart), ENTRY(weak_support_is_named))

@@ -388,8 +388,8 @@ static void draw_curve(chart *c, const ex_curve *curve) {
 static void draw_leads(chart *c) {
     static const double grey[3] = { 150, 150, 150 };
     for (const note *n = c->notes; n < c->notes + c->note_count; n++) {
-        const int below = n->box.top > n->at[1];
-        const double to[2] = { n->box.left > n->at[0] ? n->box.left : n->box.right, below ? n->box.top : n->box.bottom };
+        const ex_box *b = &n->box;
+        const double to[2] = { b->left > n->at[0] ? b->left : b->right, b->top > n->at[1] ? b->top : b->bottom };
         if (fabs(to[1] - n->at[1]) > 3 * c->size) fine_line(c, &c->frame, n->at, to, 0.3 * c->size, grey);
     }
 }
