@@ -902,6 +902,13 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_INLINE static inline
 #endif
 
+/* Kept out of line: rare, and with many callers. Compilers would copy it into each, at a tenth of their time. */
+#if defined(__GNUC__) || defined(__clang__)
+#define TLSPHI_APART static __attribute__((noinline))
+#else
+#define TLSPHI_APART static
+#endif
+
 /* gcc leaves loops over the 2 or 3 components rolled at -O2 unless asked; clang unrolls them by itself. */
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 8
 #define TLSPHI_UNROLL _Pragma("GCC unroll 9")
@@ -1018,7 +1025,7 @@ static int tlsphi_all_finite(const tlsph_real *x, size_t n) {
 }
 
 /* Fills an error record and returns its result, so that callers can write `return tlsphi_fail(...)`. */
-static tlsph_result tlsphi_fail(tlsph_error *error, tlsph_result result, const char *stage, const char *field,
+TLSPHI_APART tlsph_result tlsphi_fail(tlsph_error *error, tlsph_result result, const char *stage, const char *field,
                                 size_t particle, double value, double limit, const char *allowed) {
     if (!error) return result;
     memset(error, 0, sizeof *error);
@@ -1073,7 +1080,8 @@ static tlsph_allocator tlsphi_allocator(const tlsph_allocator *given) {
 }
 
 /* Runs task(arg, i) for every i: on the host's threads, with OpenMP, or serially. */
-static void tlsphi_parallel(tlsph_run_fn run, void *user, int threads, tlsph_task_fn task, void *arg, size_t tasks) {
+TLSPHI_APART void tlsphi_parallel(tlsph_run_fn run, void *user, int threads, tlsph_task_fn task, void *arg,
+                                  size_t tasks) {
     const long count = (long)tasks;
     if (run) {
         run(user, task, arg, tasks);
@@ -1099,7 +1107,7 @@ typedef struct tlsphi_arena {
     int overflow;
 } tlsphi_arena;
 
-static void *tlsphi_take(tlsphi_arena *arena, size_t count, size_t size) {
+TLSPHI_APART void *tlsphi_take(tlsphi_arena *arena, size_t count, size_t size) {
     size_t start = (arena->used + 63) & ~(size_t)63;
     if (size && count > (SIZE_MAX / 4 - start) / size) {
         arena->overflow = 1;
@@ -1163,6 +1171,17 @@ TLSPHI_INLINE void tlsphi_product_transposed(int n, const tlsph_real *A, const t
     TLSPHI_UNROLL for (int i = 0; i < n; i++) {
         TLSPHI_UNROLL for (int j = 0; j < n; j++) C[i * n + j] = tlsphi_dot(n, A + i * n, B + j * n);
     }
+}
+/* The same where the dimension is none, one copy of each. */
+TLSPHI_APART tlsph_real tlsphi_any_dot(int n, const tlsph_real *a, const tlsph_real *b) { return tlsphi_dot(n, a, b); }
+TLSPHI_APART void tlsphi_any_multiply(int n, const tlsph_real *A, const tlsph_real *x, tlsph_real *y) {
+    tlsphi_multiply(n, A, x, y);
+}
+TLSPHI_APART void tlsphi_any_multiply_transposed(int n, const tlsph_real *A, const tlsph_real *x, tlsph_real *y) {
+    tlsphi_multiply_transposed(n, A, x, y);
+}
+TLSPHI_APART void tlsphi_any_product(int n, const tlsph_real *A, const tlsph_real *B, tlsph_real *C) {
+    tlsphi_product(n, A, B, C);
 }
 /* Plane strain to 3-D: the out-of-plane diagonal entry is `last`. In 3-D a copy. */
 TLSPHI_INLINE void tlsphi_expand(int n, const tlsph_real *A, tlsph_real last, tlsph_real *out) {
@@ -1513,7 +1532,7 @@ static void tlsphi_plan_release(tlsphi_plan *plan) {
         plan->allocator.release(plan->allocator.user, s->memory, s->size);
     }
 }
-static tlsph_result tlsphi_plan_fail(tlsphi_plan *plan, tlsph_result result, const char *field, size_t particle,
+TLSPHI_APART tlsph_result tlsphi_plan_fail(tlsphi_plan *plan, tlsph_result result, const char *field, size_t particle,
                                      double value, double limit, const char *allowed) {
     return tlsphi_fail(plan->error, result, "create", field, particle, value, limit, allowed);
 }
@@ -2757,7 +2776,7 @@ static tlsph_result tlsphi_closure_particle(tlsphi_closer *c, size_t i, double *
     tlsphi_plan *plan = c->plan;
     const size_t D = (size_t)plan->dim, rows = c->rows, a = plan->grid.order[i];
     const tlsph_real *B = plan->desc->particles.areas + 3 * a;
-    const double BB = (double)tlsphi_dot(plan->dim, B, B), volume = pow(c->unit, (double)D);
+    const double BB = (double)tlsphi_any_dot(plan->dim, B, B), volume = pow(c->unit, (double)D);
     const double h = tlsphi_pair_h(plan, a, a) / (double)plan->desc->support / c->unit;
     double block[16] = {0}, moment[9] = {0}, m[9], A[9], *slack = c->slack[i];
     if (D == 2) moment[8] = 1;
@@ -4382,16 +4401,16 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
 TLSPHI_INLINE void tlsphi_lever(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *Z, tlsph_real *y) {
     const size_t D = (size_t)s->dim;
     tlsph_real C[3];
-    tlsphi_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
-    tlsphi_multiply(s->dim, Z, C, y);
+    tlsphi_any_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
+    tlsphi_any_multiply(s->dim, Z, C, y);
     for (size_t i = 0; i < D; i++) y[i] /= 2 * s->V[a];
 }
 /* y_b of the k-th neighbour for o = arm. */
 static tlsph_real tlsphi_share_behind(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *arm) {
     const size_t D = (size_t)s->dim;
     tlsph_real C[3] = {0, 0, 0};
-    tlsphi_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
-    return tlsphi_dot(s->dim, arm, C) / (2 * s->V[a]);
+    tlsphi_any_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
+    return tlsphi_any_dot(s->dim, arm, C) / (2 * s->V[a]);
 }
 /* The first held part of a particle >= a. */
 static tlsphi_held_part *tlsphi_find_held_part(const tlsph_solver *s, size_t a) {
@@ -4399,25 +4418,25 @@ static tlsphi_held_part *tlsphi_find_held_part(const tlsph_solver *s, size_t a) 
 }
 /* S v */
 static void tlsphi_held_components(int dim, const tlsphi_held_part *h, tlsph_real *v) {
-    const tlsph_real along = tlsphi_dot(dim, v, h->N);
+    const tlsph_real along = tlsphi_any_dot(dim, v, h->N);
     for (int i = 0; h->along && i < dim; i++) v[i] = h->along > 0 ? along * h->N[i] : v[i] - along * h->N[i];
 }
 /* P_a without M. */
 static void tlsphi_stress_behind(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *P) {
     tlsph_real PM[9];
     tlsphi_row_get(s, s->rows.PM, s->dim * s->dim, h->particle, PM);
-    tlsphi_product(s->dim, PM, h->part.W, P);
+    tlsphi_any_product(s->dim, PM, h->part.W, P);
 }
 /* The jump u - v_o by S and, with the other components of a mirror, times a column of B; arm: the same column of T^T. */
 static void tlsphi_held_jump(const tlsph_solver *s, const tlsphi_held_part *h, const tlsph_real *G, tlsph_real B,
                              const tlsph_real *arm, tlsph_real *jump) {
     const int dim = s->dim;
-    const tlsph_real *v = s->v + (size_t)dim * h->particle, deep = tlsphi_dot(dim, arm, h->N);
+    const tlsph_real *v = s->v + (size_t)dim * h->particle, deep = tlsphi_any_dot(dim, arm, h->N);
     tlsph_real slope[3] = {0, 0, 0}, held[3] = {0, 0, 0};
-    for (int i = 0; i < dim; i++) jump[i] = (h->wanted[i] - v[i]) * B - tlsphi_dot(dim, G + dim * i, arm);
+    for (int i = 0; i < dim; i++) jump[i] = (h->wanted[i] - v[i]) * B - tlsphi_any_dot(dim, G + dim * i, arm);
     tlsphi_held_components(dim, h, jump);
     if (!h->mirror) return;
-    tlsphi_multiply(dim, G, h->N, slope);
+    tlsphi_any_multiply(dim, G, h->N, slope);
     memcpy(held, slope, sizeof held);
     tlsphi_held_components(dim, h, held);
     for (int i = 0; i < dim; i++) jump[i] -= (slope[i] - held[i]) * deep;
@@ -4452,21 +4471,21 @@ static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_par
     tlsphi_stress_behind(s, h, P);
     tlsphi_row_get(s, s->rows.A, dim * dim, a, A);
     tlsphi_row_get(s, s->rows.wave, 3, a, wave);
-    tlsphi_product(dim, A, h->part.W, H);
-    tlsphi_multiply(dim, H, h->part.B, c);
-    const tlsph_real half = h->damping * wave[2] * tlsphi_sqrt(tlsphi_dot(dim, h->part.B, h->part.B)) / 2;
-    const tlsph_real normal = tlsphi_dot(dim, c, h->jump) * tlsphi_inverse_or_0(tlsphi_dot(dim, c, c));
+    tlsphi_any_product(dim, A, h->part.W, H);
+    tlsphi_any_multiply(dim, H, h->part.B, c);
+    const tlsph_real half = h->damping * wave[2] * tlsphi_sqrt(tlsphi_any_dot(dim, h->part.B, h->part.B)) / 2;
+    const tlsph_real normal = tlsphi_any_dot(dim, c, h->jump) * tlsphi_inverse_or_0(tlsphi_any_dot(dim, c, c));
     for (size_t i = 0; i < D; i++)
         damping[i] = s->dissipation == TLSPH_NO_DISSIPATION
                          ? 0
                          : half * (wave[1] * h->jump[i] + (wave[0] - wave[1]) * normal * c[i]);
     tlsphi_held_components(dim, h, damping);
-    tlsphi_multiply(dim, P, h->part.B, force);
+    tlsphi_any_multiply(dim, P, h->part.B, force);
     tlsphi_held_components(dim, h, force);
     for (size_t j = 0; j < D; j++) {
         tlsph_real arm[3] = {0, 0, 0};
         for (size_t i = 0; i < D; i++) arm[i] = h->part.T[D * i + j];
-        tlsphi_multiply(dim, P, arm, column);
+        tlsphi_any_multiply(dim, P, arm, column);
         memcpy(even, column, sizeof even);
         tlsphi_held_components(dim, h, column);
         for (size_t i = 0; i < D; i++) {
@@ -4476,7 +4495,7 @@ static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_par
     }
     for (size_t i = 0; i < D * D; i++) Z[i] += moment[i];
     for (size_t i = 0; i < D; i++) force[i] += damping[i];
-    return tlsphi_dot(dim, damping, h->jump);
+    return tlsphi_any_dot(dim, damping, h->jump);
 }
 /* Forces of all held parts, after the projection: the surroundings exert them. weight: dt times the stage's share. */
 static void tlsphi_held_forces(tlsph_solver *s, double weight) {
@@ -4485,7 +4504,7 @@ static void tlsphi_held_forces(tlsph_solver *s, double weight) {
         const size_t a = h->particle;
         tlsph_real force[3] = {0, 0, 0}, Z[9], y[3];
         const tlsph_real heat = tlsphi_held_force(s, h, force, Z);
-        s->account.external_work += weight * (double)tlsphi_dot(s->dim, force, h->wanted);
+        s->account.external_work += weight * (double)tlsphi_any_dot(s->dim, force, h->wanted);
         s->account.dissipation += weight * (double)heat;
         for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
             const size_t b = s->neighbour[k];
@@ -5583,7 +5602,7 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
             load->x[3 * i + k] = k < D ? s->now.x[at] : 0;
             if (!load->part || k >= D) continue;
             load->X[3 * i + k] += load->part[i].o[k];
-            load->x[3 * i + k] += tlsphi_dot(s->dim, s->now.F + D * at, load->part[i].o);
+            load->x[3 * i + k] += tlsphi_any_dot(s->dim, s->now.F + D * at, load->part[i].o);
         }
     load->given.values(load->given.values_user, (tlsph_real)time, count, load->host, load->X, load->x, load->values);
 }
@@ -5637,9 +5656,9 @@ static void tlsphi_load_force(const tlsph_solver *s, const tlsphi_load *load, si
         tlsph_real H[9];
         tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
         tlsphi_shrink(s->dim, pt.H, H);
-        tlsphi_multiply(s->dim, H, load->area + D * i, force);
+        tlsphi_any_multiply(s->dim, H, load->area + D * i, force);
         for (size_t k = 0; k < D; k++) force[k] *= -load->values[i];
-        if (load->part) tlsphi_product(s->dim, H, load->part[i].T, Z);
+        if (load->part) tlsphi_any_product(s->dim, H, load->part[i].T, Z);
         for (size_t k = 0; load->part && k < D * D; k++) Z[k] *= -load->values[i];
         return;
     }
@@ -5658,7 +5677,7 @@ static void tlsphi_push_particle(tlsph_solver *s, size_t a, const tlsph_real for
     tlsphi_account *account = &s->account;
     double z[3];
     tlsphi_stage_arm(s, stage, dt, a, z);
-    const tlsph_real power = tlsphi_dot(s->dim, force, s->v + D * a);
+    const tlsph_real power = tlsphi_any_dot(s->dim, force, s->v + D * a);
     for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += force[k] / s->V[a];
     account->external_work += share * (double)power;
     for (int k = 0; k < 3; k++) {
@@ -5696,8 +5715,8 @@ static void tlsphi_heat(tlsph_solver *s, size_t a, tlsph_real power, double weig
 static void tlsphi_held_heat(const tlsph_solver *s, const tlsphi_load *load, size_t i, tlsph_real *arm) {
     tlsph_real heat[3], Q[3];
     tlsphi_row_get(s, s->rows.heat, s->dim, load->inner[i], heat);
-    tlsphi_multiply_transposed(s->dim, load->part[i].W, heat, Q);
-    tlsphi_multiply_transposed(s->dim, load->part[i].T, Q, arm);
+    tlsphi_any_multiply_transposed(s->dim, load->part[i].W, heat, Q);
+    tlsphi_any_multiply_transposed(s->dim, load->part[i].T, Q, arm);
     for (int k = 0; k < s->dim; k++) arm[k] *= -*tlsphi_theta(s, load->inner[i]);
 }
 static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tlsphi_stage *stage, double dt) {
@@ -5718,8 +5737,8 @@ static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tl
 
 /* Component of a vector that a drive prescribes: all of it, or that along the normal. */
 static void tlsphi_driven_part(int dim, const tlsph_condition *c, const tlsph_real *v, tlsph_real *part) {
-    const tlsph_real nn = tlsphi_dot(dim, c->normal, c->normal);
-    const tlsph_real along = nn > 0 ? tlsphi_dot(dim, v, c->normal) / nn : 0;
+    const tlsph_real nn = tlsphi_any_dot(dim, c->normal, c->normal);
+    const tlsph_real along = nn > 0 ? tlsphi_any_dot(dim, v, c->normal) / nn : 0;
     for (int i = 0; i < dim; i++) part[i] = nn > 0 ? along * c->normal[i] : v[i];
 }
 static void tlsphi_release_driven_power(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage *stage, double dt) {
@@ -5729,8 +5748,8 @@ static void tlsphi_release_driven_power(tlsph_solver *s, tlsphi_load *load, cons
         tlsph_real part[3];
         if (tlsphi_driven_behind(load, i)) continue;
         tlsphi_driven_part(s->dim, &load->given, s->v + D * a, part);
-        const tlsph_real power = tlsphi_dot(s->dim, part, s->rate_p + D * a);
-        load->before[i] = tlsphi_dot(s->dim, part, part) * tlsphi_material_of(s, a)->rho / 2;
+        const tlsph_real power = tlsphi_any_dot(s->dim, part, s->rate_p + D * a);
+        load->before[i] = tlsphi_any_dot(s->dim, part, part) * tlsphi_material_of(s, a)->rho / 2;
         if (s->thermal == TLSPH_ENERGY && !s->leaps) s->rate_E[a] -= power;
         s->account.external_work -= stage->rate_weight * dt * (double)(power * s->V[a]);
     }
@@ -5764,8 +5783,8 @@ static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage 
         tlsphi_driven_part(s->dim, &load->given, s->old.p + D * a, was);
         tlsphi_driven_part(s->dim, &load->given, load->values + 3 * i, wanted);
         for (size_t k = 0; k < D; k++) p[k] += rho * wanted[k] - is[k];
-        const double gain = (double)(rho * tlsphi_dot(s->dim, wanted, wanted) / 2) -
-                            stage->a * (double)(tlsphi_dot(s->dim, was, was) / (2 * rho)) -
+        const double gain = (double)(rho * tlsphi_any_dot(s->dim, wanted, wanted) / 2) -
+                            stage->a * (double)(tlsphi_any_dot(s->dim, was, was) / (2 * rho)) -
                             stage->b * (double)load->before[i];
         if (s->thermal == TLSPH_ENERGY && !s->leaps) s->now.E[a] += (tlsph_real)gain;
         s->account.external_work += stage->after_weight * gain * (double)s->V[a];
@@ -5776,7 +5795,7 @@ static void tlsphi_drive(tlsph_solver *s, tlsphi_load *load, const tlsphi_stage 
 static void tlsphi_apply_fixes(const tlsph_solver *s, tlsph_real *momenta) {
     for (size_t i = 0; i < s->fixes; i++) {
         tlsph_real *p = momenta + (size_t)s->dim * s->fix[i].particle;
-        const tlsph_real along = tlsphi_dot(s->dim, p, s->fix[i].e);
+        const tlsph_real along = tlsphi_any_dot(s->dim, p, s->fix[i].e);
         for (int k = 0; k < s->dim; k++) p[k] -= along * s->fix[i].e[k];
     }
 }
@@ -5792,12 +5811,12 @@ static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, const tl
         const double rho = (double)tlsphi_material_of(s, a)->rho;
         tlsph_real gap[3] = {0, 0, 0}, *p = s->now.p + D * a;
         for (size_t k = 0; k < D; k++) gap[k] = s->now.x[D * a + k] - load->given.point[k];
-        const tlsph_real along = tlsphi_dot(s->dim, p, N);
-        if (tlsphi_dot(s->dim, gap, N) > 0 || along >= 0) continue;
+        const tlsph_real along = tlsphi_any_dot(s->dim, p, N);
+        if (tlsphi_any_dot(s->dim, gap, N) > 0 || along >= 0) continue;
         for (size_t k = 0; k < D; k++) p[k] -= along * N[k];
-        const double was = (double)tlsphi_dot(s->dim, s->old.p + D * a, N) / rho,
-                     is = (double)tlsphi_dot(s->dim, s->v + D * a, N);
-        const double rate = (double)tlsphi_dot(s->dim, s->rate_p + D * a, N);
+        const double was = (double)tlsphi_any_dot(s->dim, s->old.p + D * a, N) / rho,
+                     is = (double)tlsphi_any_dot(s->dim, s->v + D * a, N);
+        const double rate = (double)tlsphi_any_dot(s->dim, s->rate_p + D * a, N);
         const double held = rho / 2 * (stage->a * was * was + stage->b * is * is) +
                             stage->c * dt * is * rate * (s->leaps ? 0.5 : 1); /* leaps: the mean of v and 0 */
         if (s->leaps && s->thermal == TLSPH_ENERGY) s->now.E[a] += (tlsph_real)held;
@@ -7051,7 +7070,7 @@ static void tlsphi_mean_work_block(tlsph_solver *s, tlsphi_block *block) {
         const tlsph_real *held = s->held + (D + 2) * a, *p = s->now.p + D * a, *old = s->old.p + D * a;
         tlsph_real w[3] = {0, 0, 0};
         tlsphi_row_get(s, s->rows.w, s->dim, a, w);
-        const tlsph_real heat = held[D] - tlsphi_dot(s->dim, w, held);
+        const tlsph_real heat = held[D] - tlsphi_any_dot(s->dim, w, held);
         block->sums[TLSPHI_SUM_DISSIPATION] += (double)heat;
         if (!s->thermal) continue;
         const tlsph_real theta = *tlsphi_theta(s, a), density = heat / s->V[a];
@@ -7078,7 +7097,7 @@ static void tlsphi_mean_work_of_loads(tlsph_solver *s, double dt) {
                 tlsphi_driven_part(s->dim, &load->given, rate, force);
                 for (size_t l = 0; l < D; l++) force[l] *= -s->V[a];
             } else tlsphi_load_force(s, load, k, force, NULL); /* not behind surfaces */
-            s->account.external_work += dt * (double)tlsphi_dot(s->dim, force, change);
+            s->account.external_work += dt * (double)tlsphi_any_dot(s->dim, force, change);
         }
     }
 }
@@ -8151,18 +8170,19 @@ static int tlsphi_holds_velocity(tlsph_condition_kind kind) {
 }
 /* Does host particle a lie behind its surface? */
 static int tlsphi_owns_surface(const tlsph_desc *d, size_t a) {
-    return tlsphi_has_moments(d) && tlsphi_dot(d->dimension, d->particles.areas + 3 * a, d->particles.areas + 3 * a) > 0;
+    const tlsph_real *B = tlsphi_has_moments(d) ? d->particles.areas + 3 * a : NULL;
+    return B && tlsphi_any_dot(d->dimension, B, B) > 0;
 }
 /* The normal that picks a part of a particle's share of the surface; NULL: all of it. */
 static const tlsph_real *tlsphi_condition_face(int dim, const tlsph_condition *c) {
-    return tlsphi_dot(dim, c->face, c->face) > 0     ? c->face
-           : tlsphi_dot(dim, c->normal, c->normal) > 0 ? c->normal
+    return tlsphi_any_dot(dim, c->face, c->face) > 0     ? c->face
+           : tlsphi_any_dot(dim, c->normal, c->normal) > 0 ? c->normal
                                                        : NULL;
 }
 static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condition *c) {
     const size_t n = plan->n;
     const int plane = c->kind == TLSPH_ROLLER || c->kind == TLSPH_TANGENT || c->kind == TLSPH_WALL;
-    const tlsph_real NN = tlsphi_dot(plan->dim, c->normal, c->normal);
+    const tlsph_real NN = tlsphi_any_dot(plan->dim, c->normal, c->normal);
     if (c->cookie != TLSPHI_COOKIE || (unsigned)c->kind > (unsigned)TLSPH_WALL)
         return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "cookie or kind", TLSPH_NO_PARTICLE, (double)c->kind, 0,
                                 "what tlsph_condition_default sets");
@@ -8193,9 +8213,10 @@ static tlsph_result tlsphi_check_condition(tlsphi_plan *plan, const tlsph_condit
         const uint32_t a = tlsphi_set_host(c, i);
         if (!tlsphi_owns_surface(plan->desc, a)) continue;
         const tlsph_real *B = plan->desc->particles.areas + 3 * a, *N = tlsphi_condition_face(plan->dim, c);
-        const tlsph_real share = N ? tlsphi_abs(tlsphi_dot(plan->dim, B, N)) / tlsphi_sqrt(tlsphi_dot(plan->dim, N, N)) : 1;
+        const tlsph_real square = N ? tlsphi_any_dot(plan->dim, N, N) : 1;
+        const tlsph_real share = N ? tlsphi_abs(tlsphi_any_dot(plan->dim, B, N)) / tlsphi_sqrt(square) : 1;
         plan->held_parts++;
-        if (!(share > TLSPHI_R(1e-6) * tlsphi_sqrt(tlsphi_dot(plan->dim, B, B))))
+        if (!(share > TLSPHI_R(1e-6) * tlsphi_sqrt(tlsphi_any_dot(plan->dim, B, B))))
             return tlsphi_plan_fail(plan, TLSPH_ERROR_CONDITION, "share of the surface across face or normal", a,
                                     (double)share, 0, "more than 0: particles next to it (tlsph_select_plane)");
     }
@@ -9059,7 +9080,8 @@ static void tlsphi_fill_turns(tlsph_solver *s) {
 static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, const tlsph_condition *c, size_t i) {
     const size_t D = (size_t)s->dim, a = load->inner[i];
     const tlsph_real *B = s->B + D * a, *N = tlsphi_condition_face(s->dim, c);
-    const tlsph_real size = N ? tlsphi_sqrt(tlsphi_dot(s->dim, N, N)) : 0, along = N ? tlsphi_dot(s->dim, B, N) / size : 0;
+    const tlsph_real size = N ? tlsphi_sqrt(tlsphi_any_dot(s->dim, N, N)) : 0;
+    const tlsph_real along = N ? tlsphi_any_dot(s->dim, B, N) / size : 0, BB = tlsphi_any_dot(s->dim, B, B);
     if (c->kind == TLSPH_PRESSURE) {
         for (size_t k = 0; k < D; k++) {
             load->area[D * i + k] = c->areas ? c->areas[3 * i + k] : N ? along * N[k] / size : B[k];
@@ -9068,13 +9090,14 @@ static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, con
         }
         return;
     }
-    load->area[i] = c->areas ? c->areas[i] : N == c->face ? tlsphi_abs(along) : N ? along : tlsphi_sqrt(tlsphi_dot(s->dim, B, B));
+    load->area[i] = c->areas ? c->areas[i] : N == c->face ? tlsphi_abs(along) : N ? along : tlsphi_sqrt(BB);
 }
 /* The part of particle a's share of the surface that a condition means: all, or N N.B with moment N (x) T^T N. */
 static tlsphi_part tlsphi_part_of(const tlsph_solver *s, const tlsphi_plan *plan, const tlsph_condition *c, size_t a) {
     const size_t D = (size_t)s->dim;
     const tlsph_real *T = plan->desc->particles.moments + 9 * plan->host[a], *N = tlsphi_condition_face(s->dim, c);
-    const tlsph_real NN = N ? tlsphi_dot(s->dim, N, N) : 1, along = N ? tlsphi_dot(s->dim, s->B + D * a, N) / NN : 0;
+    const tlsph_real NN = N ? tlsphi_any_dot(s->dim, N, N) : 1;
+    const tlsph_real along = N ? tlsphi_any_dot(s->dim, s->B + D * a, N) / NN : 0;
     tlsphi_part out;
     double A[9];
     memset(&out, 0, sizeof out);
@@ -9110,14 +9133,16 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
                 h->particle = a;
                 h->load = c->kind == TLSPH_VELOCITY ? load : TLSPHI_NONE;
                 h->item = (uint32_t)i;
-                h->along = c->kind == TLSPH_TANGENT ? -1 : c->kind != TLSPH_CLAMPED && tlsphi_dot(s->dim, c->normal, c->normal) > 0;
+                h->along = c->kind == TLSPH_TANGENT ? -1
+                                                    : c->kind != TLSPH_CLAMPED &&
+                                                          tlsphi_any_dot(s->dim, c->normal, c->normal) > 0;
                 h->mirror = tlsphi_is_constraint(c->kind) && h->along && d->mirror_gradients;
                 if (h->along) tlsphi_unit_normal(c, s->dim, N);
                 for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
                 h->part = tlsphi_part_of(s, plan, c, a);
                 tlsph_real MB[3] = {0, 0, 0}; /* sum of g is -B */
-                tlsphi_multiply(s->dim, s->M + (size_t)(s->dim * s->dim) * a, s->B + (size_t)s->dim * a, MB);
-                const tlsph_real own = 1 + tlsphi_max(0, tlsphi_dot(s->dim, h->part.o, MB)) / (2 * s->V[a]);
+                tlsphi_any_multiply(s->dim, s->M + (size_t)(s->dim * s->dim) * a, s->B + (size_t)s->dim * a, MB);
+                const tlsph_real own = 1 + tlsphi_max(0, tlsphi_any_dot(s->dim, h->part.o, MB)) / (2 * s->V[a]);
                 h->damping = 1 / (own * own);
             }
             load += !tlsphi_is_constraint(c->kind);
@@ -9969,7 +9994,7 @@ static double tlsphi_mesh_normal(const tlsphi_mesh *m, size_t facet, double n[3]
     for (int k = 0; k < 3; k++) n[k] /= size > 0 ? size : 1;
     return m->dim == 2 ? size : size / 2;
 }
-static tlsph_result tlsphi_surface_fail(tlsph_error *error, const char *what, const double X[3], double value,
+TLSPHI_APART tlsph_result tlsphi_surface_fail(tlsph_error *error, const char *what, const double X[3], double value,
                                         const char *allowed) {
     const tlsph_result r =
         tlsphi_fail(error, TLSPH_ERROR_SURFACE, "surface", what, TLSPH_NO_PARTICLE, value, 0, allowed);
@@ -11315,7 +11340,7 @@ static void tlsphi_jitter(const tlsphi_lattice *l, tlsph_real *X, const tlsph_re
         }
 }
 
-static tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const char *field, double value,
+TLSPHI_APART tlsph_result tlsphi_fill_fail(tlsph_error *error, tlsph_result r, const char *field, double value,
                                      const char *allowed) {
     return tlsphi_fail(error, r, "fill", field, TLSPH_NO_PARTICLE, value, 0, allowed);
 }
