@@ -4464,7 +4464,8 @@ static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tls
         }
 }
 /* Force of a held part: S P B and the damping D, with its first moment Z; returns the heat D.jump, W. */
-static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *force, tlsph_real *Z) {
+static tlsph_real tlsphi_held_force(const tlsph_solver *s, const tlsphi_held_part *h, tlsph_real *force,
+                                    tlsph_real *Z) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, a = h->particle;
     tlsph_real P[9], A[9], H[9], c[3] = {0}, damping[3], wave[3], column[3] = {0}, even[3], moment[9] = {0};
@@ -5613,7 +5614,8 @@ TLSPHI_INLINE double tlsphi_next_position(const tlsph_solver *s, const tlsphi_st
     const double was = (double)s->old.x[at];
     return was + stage->b * ((double)s->now.x[at] - was) + stage->c * dt * (double)s->v[at];
 }
-TLSPHI_INLINE void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a, double X[3]) {
+TLSPHI_INLINE void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_stage *stage, double dt, size_t a,
+                                         double X[3]) {
     const size_t D = (size_t)s->dim;
     X[2] = 0;
     for (size_t i = 0; i < D; i++)
@@ -8278,7 +8280,8 @@ static tlsph_result tlsphi_plan_conditions(tlsphi_plan *plan) {
         const tlsph_result r = tlsphi_check_condition(plan, d->conditions + k);
         if (r) return r;
         constraints += tlsphi_is_constraint(d->conditions[k].kind) ? 1 : 0;
-        const int mirror = d->mirror_gradients && (d->conditions[k].kind == TLSPH_ROLLER || d->conditions[k].kind == TLSPH_TANGENT);
+        const tlsph_condition_kind kind = d->conditions[k].kind;
+        const int mirror = d->mirror_gradients && (kind == TLSPH_ROLLER || kind == TLSPH_TANGENT);
         for (size_t i = 0; mirror && i < tlsphi_set_size(plan, d->conditions + k); i++)
             plan->mirrors += !tlsphi_owns_surface(d, tlsphi_set_host(d->conditions + k, i));
     }
@@ -8492,7 +8495,8 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->plan = plan;
     t->damped = damped;
     t->graph = plan->graph + damped;
-    t->graph->width = plan->dim + (plan->desc->thermal && plan->desc->conduction == TLSPH_COMPACT && !plan->antisymmetric ? 2 : 1);
+    const int compact = plan->desc->thermal && plan->desc->conduction == TLSPH_COMPACT;
+    t->graph->width = plan->dim + (compact && !plan->antisymmetric ? 2 : 1);
     t->most = plan->most;
     t->list = TLSPHI_SCRATCH(plan, uint32_t, all);
     t->g = TLSPHI_SCRATCH(plan, double, D * all);
@@ -8601,11 +8605,13 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     if (tlsphi_is_cells(desc) && (r = tlsphi_cells_build(plan))) return r;
     if (desc->dissipation == TLSPH_SELF_ADJOINT && !tlsphi_takes_self_adjoint(desc))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "dissipation", TLSPH_NO_PARTICLE, TLSPH_SELF_ADJOINT, 0,
-                                "TLSPH_SELF_ADJOINT with TLSPH_RK2 or TLSPH_SSP_RK3, explicit, without sharp gradients, bonds, "
-                                "TLSPH_CELLS_4, `moments` and TLSPH_VON_MISES");
-    if (desc->operator_kind == TLSPH_CELLS_4 && (desc->sharp_gradients || desc->dissipation == TLSPH_JST || desc->scheme == TLSPH_INCOMPRESSIBLE))
+                                "TLSPH_SELF_ADJOINT with TLSPH_RK2 or TLSPH_SSP_RK3, explicit, without sharp gradients, "
+                                "bonds, TLSPH_CELLS_4, `moments` and TLSPH_VON_MISES");
+    if (desc->operator_kind == TLSPH_CELLS_4 &&
+        (desc->sharp_gradients || desc->dissipation == TLSPH_JST || desc->scheme == TLSPH_INCOMPRESSIBLE))
         return tlsphi_plan_fail(plan, TLSPH_ERROR_DESCRIPTION, "operator_kind", TLSPH_NO_PARTICLE, TLSPH_CELLS_4, 0,
-                                "TLSPH_CELLS_4 without sharp gradients (it has their order), TLSPH_JST, TLSPH_INCOMPRESSIBLE");
+                                "TLSPH_CELLS_4 without sharp gradients (it has their order), TLSPH_JST, "
+                                "TLSPH_INCOMPRESSIBLE");
     if (desc->operator_kind == TLSPH_CELLS_4 && (r = tlsphi_fourth_build(plan))) return r;
     if (desc->operator_kind == TLSPH_GIVEN && (r = tlsphi_given_check(plan))) return r;
     tlsphi_smoothing_length(plan);
@@ -11500,7 +11506,8 @@ TLSPHI_DEF tlsph_result tlsph_cloud_create(const tlsph_fill *fill, tlsph_cloud *
     if (!tlsphi_scatters(fill)) {
         r = tlsphi_lattice_make(&l, error);
         if (!r) r = tlsphi_cloud_fill(&l, cloud, error);
-    } else if (fill->shape == TLSPH_BOX || fill->shape == TLSPH_L_SHAPE) r = tlsphi_cloud_voronoi(&l, cloud, NULL, NULL, NULL, error);
+    } else if (fill->shape == TLSPH_BOX || fill->shape == TLSPH_L_SHAPE)
+        r = tlsphi_cloud_voronoi(&l, cloud, NULL, NULL, NULL, error);
     else r = tlsphi_cloud_scatter(fill, NULL, cloud, error);
     if (r) tlsph_cloud_destroy(cloud);
     if (l.memory) l.allocator.release(l.allocator.user, l.memory, l.memory_size);
