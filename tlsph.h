@@ -972,9 +972,9 @@ TLSPHI_INLINE int tlsphi_finite(tlsph_real x) {
 #endif
 }
 /* x^(-1/3) for positive, normal x to the last digit or two: a third of the exponent, taken from the bits, is right within a
-   few percent, and each Newton step y (4 - x y^3)/3 doubles the digits. Inlined where the materials need it, because a
-   call of libm from code that has used wide registers may cost more than all the rest of a material; and the same on
-   every machine. */
+   few percent, and each Newton step 4/3 y - x/3 y^4 doubles the digits (in this form few operations wait for each other, and
+   a material waits for its roots). Inlined where the materials need it, because a call of libm from code that has used wide
+   registers may cost more than all the rest of a material; and the same on every machine. */
 TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
     tlsph_real y;
 #ifdef TLSPH_REAL_FLOAT
@@ -987,7 +987,11 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
     bits = (0x553ef0ffu - ((bits >> 32) * 0x55555556u >> 32)) << 32;
 #endif
     memcpy(&y, &bits, sizeof y);
-    for (int i = 0; i < 5; i++) y *= (4 - x * y * y * y) * TLSPHI_R(1.0 / 3.0);
+    const tlsph_real third = x * TLSPHI_R(1.0 / 3.0);
+    TLSPHI_UNROLL for (int i = 0; i < 5; i++) {
+        const tlsph_real square = y * y;
+        y = TLSPHI_R(4.0 / 3.0) * y - third * square * square;
+    }
     return y;
 }
 /* x^(-1/2) and x^(1/2) in the same manner, for loops over lanes: sqrt must set errno, which no compiler can do for eight
@@ -1005,7 +1009,8 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real given) {
     bits = 0x5fe6eb50c7b537a9u - (bits >> 1);
 #endif
     memcpy(&y, &bits, sizeof y);
-    TLSPHI_UNROLL for (int i = 0; i < 4; i++) y *= TLSPHI_R(1.5) - TLSPHI_R(0.5) * x * y * y;
+    const tlsph_real half = x / 2;
+    TLSPHI_UNROLL for (int i = 0; i < 4; i++) y = TLSPHI_R(1.5) * y - half * y * (y * y);
     return y;
 }
 TLSPHI_INLINE tlsph_real tlsphi_square_root(tlsph_real x) { return x * tlsphi_inverse_root(x); }
@@ -1306,8 +1311,8 @@ static void tlsphi_stretches(const tlsph_real *F, double out[3]) {
 /* Upper bound of the largest eigenvalue of a 3x3 semi-definite tensor from its trace and the trace of its square;
    exact when the two smaller ones are equal, and much cheaper than the eigenvalue. */
 TLSPHI_INLINE tlsph_real tlsphi_largest_bound(tlsph_real trace, tlsph_real trace_of_square) {
-    const tlsph_real spread = trace_of_square - trace * trace / 3;
-    return trace / 3 + tlsphi_square_root(TLSPHI_R(2.0 / 3.0) * tlsphi_max(spread, 0));
+    const tlsph_real spread = trace_of_square - trace * trace * TLSPHI_R(1.0 / 3.0);
+    return trace * TLSPHI_R(1.0 / 3.0) + tlsphi_square_root(TLSPHI_R(2.0 / 3.0) * tlsphi_max(spread, 0));
 }
 static double tlsphi_dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 static double tlsphi_norm2(const double a[3]) { return tlsphi_dot3(a, a); }
@@ -3057,21 +3062,22 @@ static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
 
 /* The deviatoric energy and its derivatives: Sigma_F = a F, Sigma_H = b H, dpsi/dJ = c. */
 typedef struct tlsphi_deviator {
-    tlsph_real psi, a, b, c;
+    tlsph_real psi, a, b, c, per_J;
 } tlsphi_deviator;
 
 TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_real I1, tlsph_real I2, tlsph_real J) {
     tlsphi_deviator out;
     const tlsph_real root = tlsphi_inverse_cube_root(J), J23 = root * root;
+    out.per_J = J23 * root;
     out.psi = m->zeta * (J23 * I1 - 3);
     out.a = 2 * m->zeta * J23;
     out.b = 0;
-    out.c = -out.a * I1 / (3 * J);
+    out.c = -out.a * I1 * out.per_J * TLSPHI_R(1.0 / 3.0);
     if (m->mooney) {
-        const tlsph_real root2 = tlsphi_square_root(I2), J2 = 1 / (J * J);
+        const tlsph_real root2 = tlsphi_square_root(I2), J2 = out.per_J * out.per_J;
         out.psi += m->gamma * (J2 * I2 * root2 - TLSPHI_R(5.196152422706632));
         out.b = 3 * m->gamma * J2 * root2;
-        out.c -= 2 * m->gamma * J2 * I2 * root2 / J;
+        out.c -= 2 * m->gamma * J2 * I2 * root2 * out.per_J;
     }
     return out;
 }
@@ -3101,11 +3107,12 @@ TLSPHI_INLINE tlsphi_invariants tlsphi_principal_bounds(tlsph_real I1, tlsph_rea
 }
 TLSPHI_INLINE tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev,
                                         const tlsphi_invariants *s) {
-    const tlsph_real ratio = tlsphi_square_root(s->L1 * s->LH) / s->J; /* largest over least stretch */
-    tlsph_real along = dev->a * (5 * s->I1 * s->LH / (9 * s->J * s->J) - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
-    tlsph_real across = dev->a, mixed = dev->a * (ratio - 1 / ratio) / 3;
+    const tlsph_real per_root = tlsphi_inverse_root(s->L1 * s->LH); /* over J the least stretch over the largest */
+    const tlsph_real ratio = s->L1 * s->LH * per_root * dev->per_J, J2 = dev->per_J * dev->per_J;
+    tlsph_real along = dev->a * (TLSPHI_R(5.0 / 9.0) * s->I1 * s->LH * J2 - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
+    tlsph_real across = dev->a, mixed = dev->a * (ratio - per_root * s->J) * TLSPHI_R(1.0 / 3.0);
     if (m->mooney) {
-        const tlsph_real factor = dev->b / (s->J * s->J * s->I2); /* 3 gamma J^-4 / sqrt I2 */
+        const tlsph_real factor = dev->b * J2 / s->I2;            /* 3 gamma J^-4 / sqrt I2 */
         const tlsph_real least = s->J * s->J / s->L1;             /* of H^T H */
         const tlsph_real half = (s->LH - least) / 2, sum = s->I2 + s->LH;
         const tlsph_real bracket = sum * sum - 2 * s->I2 * s->I2;
@@ -3119,10 +3126,11 @@ TLSPHI_INLINE tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const t
    d eta_R/dF N = (beta theta_R h - P_psi N)/theta_R = c_h h + c_f f + c_r r. */
 TLSPHI_INLINE tlsph_real tlsphi_entropic_coupling(const tlsphi_material *m, const tlsphi_deviator *dev,
                                            const tlsphi_invariants *s) {
-    const tlsph_real mooney = dev->b * s->I2 / s->J; /* 3 gamma J^-3 I2^3/2 */
-    const tlsph_real volumetric = m->k * (s->J - 1) - dev->a * s->I1 / (3 * s->J) + mooney / 3;
-    const tlsph_real c_h = m->beta - volumetric / m->theta_R, c_f = -dev->a / m->theta_R;
-    const tlsph_real c_r = mooney / (s->I2 * m->theta_R), least = s->J * s->J / s->L1;
+    const tlsph_real per_theta = 1 / m->theta_R, third = TLSPHI_R(1.0 / 3.0);
+    const tlsph_real mooney = dev->b * s->I2 * dev->per_J; /* 3 gamma J^-3 I2^3/2 */
+    const tlsph_real volumetric = m->k * (s->J - 1) - dev->a * s->I1 * dev->per_J * third + mooney * third;
+    const tlsph_real c_h = m->beta - volumetric * per_theta, c_f = -dev->a * per_theta;
+    const tlsph_real c_r = dev->b * dev->per_J * per_theta, least = s->J * s->J / s->L1;
     tlsph_real largest = 0;
     for (int end = 0; end < 2; end++) {
         const tlsph_real c = c_h + c_r * (end ? s->LH : least);
@@ -3140,17 +3148,17 @@ static int tlsphi_has_invariants(tlsph_material_kind kind) {
 TLSPHI_INLINE void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s, int coupled,
                           tlsph_response *out) {
     const tlsph_real elastic = tlsphi_acoustic_bound(m, dev, s);
-    const tlsph_real shear = dev->a + dev->b * s->I1 / 3;
+    const tlsph_real shear = dev->a + dev->b * s->I1 * TLSPHI_R(1.0 / 3.0), per_theta = 1 / m->theta_R, per_c_v = 1 / m->c_v;
     if (m->entropic) {
         out->p_modulus[0] = out->s_modulus[0] = 0;
-        out->p_modulus[1] = elastic / m->theta_R;
-        if (coupled) out->p_modulus[1] += tlsphi_entropic_coupling(m, dev, s) / m->c_v;
-        out->s_modulus[1] = shear / m->theta_R;
+        out->p_modulus[1] = elastic * per_theta;
+        if (coupled) out->p_modulus[1] += tlsphi_entropic_coupling(m, dev, s) * per_c_v;
+        out->s_modulus[1] = shear * per_theta;
         return;
     }
     const tlsph_real power = m->q == 1 ? 1 : tlsphi_pow(s->J, m->q - 1), gruneisen = m->beta * power; /* d eta_R/dJ */
-    tlsph_real thermal = m->beta * (1 - m->q) * power / s->J;
-    if (coupled && m->beta != 0) thermal += gruneisen * gruneisen / m->c_v;
+    tlsph_real thermal = m->beta * (1 - m->q) * power * dev->per_J;
+    if (coupled && m->beta != 0) thermal += gruneisen * gruneisen * per_c_v;
     out->p_modulus[0] = elastic;
     out->p_modulus[1] = thermal * s->LH;
     out->s_modulus[0] = shear;
@@ -3196,15 +3204,16 @@ TLSPHI_INLINE void tlsphi_respond_inline(const tlsphi_material *m, const tlsph_r
         for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
     }
     const tlsph_real u = m->k / 2 * (J - 1) * (J - 1), du = m->k * (J - 1), thermal = m->beta * m->theta_R;
+    const tlsph_real per_theta = 1 / m->theta_R; /* once for all lanes: a division a component is half of a material's time */
     if (m->entropic) {
         out->energy = thermal * (J - 1);
-        out->entropy = (out->energy - dev->psi - u) / m->theta_R;
+        out->entropy = (out->energy - dev->psi - u) * per_theta;
         for (int i = 0; i < 9; i++) {
             out->e_F[i] = 0;
-            out->eta_F[i] = -S[i] / m->theta_R;
+            out->eta_F[i] = -S[i] * per_theta;
         }
         out->e_J = thermal;
-        out->eta_J = m->beta - du / m->theta_R;
+        out->eta_J = m->beta - du * per_theta;
     } else {
         const tlsph_real power = m->q == 1 ? J : m->q == 0 ? 1 : tlsphi_pow(J, m->q);
         out->energy = dev->psi + u + thermal * (J - 1);
@@ -3214,7 +3223,7 @@ TLSPHI_INLINE void tlsphi_respond_inline(const tlsphi_material *m, const tlsph_r
             out->eta_F[i] = 0;
         }
         out->e_J = du + thermal;
-        out->eta_J = m->beta * power / J;
+        out->eta_J = m->q == 1 ? m->beta : m->beta * power / J;
     }
     const tlsphi_invariants spread = tlsphi_principal_bounds(I1, I2, Jd);
     tlsphi_moduli(m, dev, &spread, coupled, out);
@@ -3227,7 +3236,7 @@ static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const 
 
 /* W(phi)/(b0 mu), W' and W'' of the drift potential. */
 TLSPHI_INLINE void tlsphi_drift(tlsph_real phi, tlsph_real scale, tlsph_real *W, tlsph_real *dW, tlsph_real *ddW) {
-    const tlsph_real s2 = phi * phi / (scale * scale);
+    const tlsph_real per_square = 1 / (scale * scale), s2 = phi * phi * per_square;
     *W = phi * phi * (TLSPHI_R(0.5) + TLSPHI_R(0.25) * s2);
     *dW = phi * (1 + s2);
     *ddW = 1 + 3 * s2;
@@ -3466,7 +3475,8 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
 /* ==== [SOLVER-DATA] ================================================================================================
    All arrays are in the solver's order and lie in one block. D = dimension, DD = D * D. Optional arrays are NULL where
    the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
-   so their value does not depend on the threads. */
+   so their value does not depend on the threads. Vectors have their components side by side; tensors of the state (F, H)
+   and grad v lie by tiles, a component of all its particles side by side, as the loops over lanes take them. */
 
 /* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
    P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, drift
@@ -3505,8 +3515,8 @@ TLSPHI_INLINE tlsphi_rows tlsphi_rows_of(const int dim, const int has_J, int the
 }
 
 typedef struct tlsphi_state {
-    tlsph_real *x, *p, *F; /* D, D, DD */
-    tlsph_real *H, *J, *E; /* DD, 1, 1 (E or eta); optional */
+    tlsph_real *x, *p, *F; /* D, D, DD by tiles */
+    tlsph_real *H, *J, *E; /* DD by tiles, 1, 1 (E or eta); optional */
     tlsph_real *plastic;   /* tlsphi_plastic_reals; optional */
     tlsph_real *q;         /* 1: pressure of the incompressible scheme (tension positive); optional */
 } tlsphi_state;
@@ -3715,6 +3725,25 @@ TLSPHI_INLINE void tlsphi_row_put(const tlsph_solver *s, int row, const int n, s
     tlsph_real *at = tlsphi_at(s, row, a);
     TLSPHI_UNROLL for (int i = 0; i < n; i++) at[(size_t)i * TLSPHI_ROW] = in[i];
 }
+/* Places of a field of tensors by tiles, and the first component of particle a; the others follow TLSPHI_LANES apart. */
+TLSPHI_INLINE size_t tlsphi_tensor_reals(size_t n, size_t dd) {
+    return (n + TLSPHI_LANES - 1) / TLSPHI_LANES * TLSPHI_LANES * dd;
+}
+TLSPHI_INLINE size_t tlsphi_tensor_at(size_t dd, size_t a) { return a / TLSPHI_LANES * dd * TLSPHI_LANES + a % TLSPHI_LANES; }
+TLSPHI_INLINE void tlsphi_tensor_get(const tlsph_real *field, const int dd, size_t a, tlsph_real *out) {
+    const tlsph_real *at = field + tlsphi_tensor_at((size_t)dd, a);
+    TLSPHI_UNROLL for (int i = 0; i < dd; i++) out[i] = at[(size_t)i * TLSPHI_LANES];
+}
+TLSPHI_INLINE void tlsphi_tensor_put(tlsph_real *field, const int dd, size_t a, const tlsph_real *in) {
+    tlsph_real *at = field + tlsphi_tensor_at((size_t)dd, a);
+    TLSPHI_UNROLL for (int i = 0; i < dd; i++) at[(size_t)i * TLSPHI_LANES] = in[i];
+}
+/* As 3x3, with the third diagonal entry of plane strain. */
+static void tlsphi_tensor_expand(const tlsph_real *field, int dim, size_t a, tlsph_real third, tlsph_real out[9]) {
+    tlsph_real in_plane[9];
+    tlsphi_tensor_get(field, dim * dim, a, in_plane);
+    tlsphi_expand(dim, in_plane, third, out);
+}
 
 /* End of the tile that begins with particle a. */
 TLSPHI_INLINE size_t tlsphi_tile_end(const tlsphi_block *block, size_t a) {
@@ -3780,14 +3809,13 @@ typedef struct tlsphi_point {
 static void tlsphi_load_measures(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a,
                                  tlsphi_point *pt) {
     const int dim = s->dim;
-    const size_t dd = (size_t)(dim * dim);
-    tlsphi_expand(dim, u->F + dd * a, 1, pt->F);
+    tlsphi_tensor_expand(u->F, dim, a, 1, pt->F);
     if (m->kind == TLSPH_LINEAR) {
         tlsphi_identity(pt->H);
         pt->d = pt->F[0] + pt->F[4] + pt->F[8] - 2;
     } else {
         pt->d = tlsph_determinant(pt->F);
-        if (s->has_H) tlsphi_expand(dim, u->H + dd * a, pt->F[0] * pt->F[4] - pt->F[1] * pt->F[3], pt->H);
+        if (s->has_H) tlsphi_tensor_expand(u->H, dim, a, pt->F[0] * pt->F[4] - pt->F[1] * pt->F[3], pt->H);
         else tlsph_cofactor(pt->F, pt->H);
     }
     pt->J = s->has_J ? u->J[a] : pt->d;
@@ -3798,9 +3826,10 @@ TLSPHI_INLINE tlsph_real tlsphi_add_drift(const tlsphi_material *m, tlsph_real s
                                           tlsphi_point *pt) {
     tlsph_real W, dW, ddW;
     tlsphi_drift(pt->J - pt->d, scale, &W, &dW, &ddW);
-    if (m->entropic) pt->r.entropy -= stiffness * W / m->theta_R;
+    const tlsph_real per_theta = stiffness / m->theta_R, per_kappa = stiffness / m->kappa;
+    if (m->entropic) pt->r.entropy -= per_theta * W;
     else pt->r.energy += stiffness * W;
-    pt->drift_ratio = stiffness * ddW / m->kappa;
+    pt->drift_ratio = per_kappa * ddW;
     return stiffness * dW;
 }
 
@@ -3847,12 +3876,12 @@ static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state 
 
 /* Stress, Sigma_J and wave speeds at the temperature theta; p: Sigma_J without the drift's part, or the pressure. */
 TLSPHI_INLINE void tlsphi_conclude(const tlsphi_material *m, tlsph_real theta, tlsph_real pressure, tlsphi_point *pt) {
-    const tlsph_real per_rho = 1 / m->rho;
+    const tlsph_real per_rho = 1 / m->rho, per_theta = 1 / m->theta_R;
     pt->theta = theta;
     pt->p = pressure;
     TLSPHI_UNROLL for (int i = 0; i < 9; i++) pt->P[i] =
         pt->r.e_F[i] - theta * pt->r.eta_F[i] + pt->p * pt->H[i];
-    pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta / m->theta_R : 1);
+    pt->Sigma_J = pt->p + pt->Sigma_J * (m->entropic ? theta * per_theta : 1);
     pt->c_p = tlsphi_square_root(tlsphi_max(pt->r.p_modulus[0] + theta * pt->r.p_modulus[1], 0) * per_rho);
     pt->c_s = tlsphi_square_root(tlsphi_max(pt->r.s_modulus[0] + theta * pt->r.s_modulus[1], 0) * per_rho);
 }
@@ -3968,7 +3997,7 @@ static int tlsphi_flow(tlsph_solver *s, size_t a) {
     tlsphi_plastic plastic;
     tlsph_real F[9];
     if (m->kind != TLSPH_VON_MISES) return 0;
-    tlsphi_expand(s->dim, s->now.F + (size_t)(s->dim * s->dim) * a, 1, F);
+    tlsphi_tensor_expand(s->now.F, s->dim, a, 1, F);
     tlsphi_load_plastic(s->dim, s->thermal, s->old.plastic + reals * a, &plastic);
     const tlsph_real d = tlsph_determinant(F);
     const int flows = d > 0 && tlsphi_finite(d) && tlsphi_return_map(m, F, d, &plastic);
@@ -4019,8 +4048,8 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
 
 /* A tile's state as lanes. */
 typedef struct tlsphi_state_lanes {
-    tlsph_real F[9 * TLSPHI_LANES_MOST], H[9 * TLSPHI_LANES_MOST], v[3 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST],
-        E[TLSPHI_LANES_MOST], c_p[TLSPHI_LANES_MOST], heat[TLSPHI_LANES_MOST], good[TLSPHI_LANES_MOST];
+    const tlsph_real *F, *H;
+    tlsph_real v[3 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST], E[TLSPHI_LANES_MOST], c_p[TLSPHI_LANES_MOST], heat[TLSPHI_LANES_MOST], good[TLSPHI_LANES_MOST];
 } tlsphi_state_lanes;
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
@@ -4058,6 +4087,7 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
     const int dd = dim * dim, has_J = s->has_J, heated = s->thermal == TLSPH_ENERGY, conducts = s->conducts;
     const tlsphi_rows r = s->rows;
     const tlsph_real stiffness = has_J ? s->drift_stiffness * given->mu : 0, scale = s->drift_scale;
+    const tlsph_real per_c_v = 1 / given->c_v;
     tlsphi_material m = *given;
     m.entropic = entropic;
     m.mooney = mooney;
@@ -4074,7 +4104,7 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) pt.kinetic +=
             x->v[(size_t)i * TLSPHI_LANES + l] * x->v[(size_t)i * TLSPHI_LANES + l];
         pt.kinetic *= m.rho / 2;
-        const tlsph_real theta = m.theta_R + (heated ? (x->E[l] - pt.kinetic - pt.r.energy) / m.c_v : 0);
+        const tlsph_real theta = m.theta_R + (heated ? (x->E[l] - pt.kinetic - pt.r.energy) * per_c_v : 0);
         tlsphi_conclude(&m, theta, pt.r.e_J - theta * pt.r.eta_J, &pt);
         tlsphi_shrink(dim, pt.P, out);
         TLSPHI_UNROLL for (int i = 0; i < dd; i++) P[(size_t)i * TLSPHI_ROW + l] = out[i];
@@ -4143,16 +4173,34 @@ TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, con
     }
 }
 /* Longest steps of the particles of a tile: as tlsphi_particle_step. */
-static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_material *m,
-                             const tlsphi_state_lanes *x) {
+static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_state_lanes *x) {
+    const tlsph_real *tau = s->tau + begin;
+    tlsph_real least = 1 / TLSPHI_TINY;
     for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        tlsphi_point pt;
-        double heat;
-        pt.c_p = x->c_p[l];
-        if (s->conducts) tlsphi_load_measures(s, &s->now, m, begin + l, &pt);
-        block->time_step = tlsphi_dmin(block->time_step, tlsphi_particle_step(s, begin + l, &pt, &heat));
-        block->heat_step = tlsphi_dmin(block->heat_step, heat);
+        const tlsph_real beside = s->beside ? s->beside[2 * (begin + l)] : 1;
+        least = tlsphi_min(least, beside * tau[l] / tlsphi_max(x->c_p[l], TLSPHI_TINY));
     }
+    if (s->step_rule == TLSPH_STEP_BY_PARTICLE)
+        block->time_step = tlsphi_dmin(block->time_step, (double)s->cfl * (double)least);
+}
+/* The diffusive limit; before P and H are corrected. */
+TLSPHI_INLINE void tlsphi_tile_heat_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_material *m,
+                                         const tlsphi_state_lanes *x, const int dim) {
+    const tlsph_real *tau = s->tau + begin, *row = tlsphi_at(s, s->rows.A, begin);
+    tlsph_real least = 1 / TLSPHI_TINY;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const tlsph_real h = s->beside ? s->beside[2 * (begin + l) + 1] : m->h;
+        tlsph_real in_plane[9], H[9], HtH[9];
+        tlsphi_take_rows(dim * dim, row + l, in_plane);
+        tlsphi_expand(dim, in_plane, dim == 3 ? 0 : in_plane[0] * in_plane[3] - in_plane[1] * in_plane[2], H);
+        tlsphi_product_transposed(3, H, H, HtH); /* H H^T: its eigenvalues are those of H^T H */
+        const tlsph_real bound = tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
+        least = tlsphi_min(least, tau[l] * tau[l] * x->J[l] / tlsphi_max(h * bound, TLSPHI_TINY));
+    }
+    const double per = 2 * dim, sharp = s->sharp ? TLSPHI_SHARP_STEP * TLSPHI_SHARP_STEP : 1;
+    const double heat = 0.8 * (double)m->c_v * sharp * (double)least / per;
+    block->heat_step = tlsphi_dmin(block->heat_step, heat);
+    if (!s->super.most) block->time_step = tlsphi_dmin(block->time_step, heat);
 }
 TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, size_t begin, const int dim) {
     const size_t D = (size_t)dim, dd = D * D;
@@ -4162,13 +4210,15 @@ TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, siz
     tlsphi_state_lanes x;
     for (size_t i = 0; i < D * TLSPHI_LANES; i++) s->v[D * begin + i] = s->now.p[D * begin + i] * per_rho;
     tlsphi_transpose(s->v + D * begin, D, x.v);
-    tlsphi_transpose(s->now.F + dd * begin, dd, x.F);
-    if (s->has_H) tlsphi_transpose(s->now.H + dd * begin, dd, x.H);
+    x.F = s->now.F + dd * begin;
+    x.H = s->has_H ? s->now.H + dd * begin : NULL;
     if (s->has_J) memcpy(x.J, s->now.J + begin, TLSPHI_LANES * sizeof *x.J);
     if (s->thermal) memcpy(x.E, s->now.E + begin, TLSPHI_LANES * sizeof *x.E);
     tlsphi_constitute_tile(s, m, &x, row);
     for (size_t l = 0; l < TLSPHI_LANES; l++) good *= x.good[l];
     if (good < 1) return 0;
+    tlsphi_tile_step(s, block, begin, &x);
+    if (s->conducts) tlsphi_tile_heat_step(s, block, begin, m, &x, dim);
     for (size_t i = 0; i < D; i++) {
         memcpy(row + ((size_t)s->rows.v + i) * TLSPHI_ROW, x.v + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *x.v);
         if (!s->projection)
@@ -4178,7 +4228,6 @@ TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, siz
         tlsphi_correct_rows(s->M + dd * begin, row + (size_t)s->rows.PM * TLSPHI_ROW, dim);
         tlsphi_correct_rows(s->M + dd * begin, row + (size_t)s->rows.A * TLSPHI_ROW, dim);
     }
-    tlsphi_tile_step(s, block, begin, m, &x);
     return 1;
 }
 static int tlsphi_evaluate_lanes(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t end) {
@@ -4445,8 +4494,8 @@ static void tlsphi_held_jump(const tlsph_solver *s, const tlsphi_held_part *h, c
 static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tlsphi_held_part *end) {
     const int dim = s->dim;
     const size_t D = (size_t)dim, dd = D * D, a = h->particle;
-    tlsph_real G[9], P[9], *grad = s->grad_v + dd * a;
-    memcpy(G, grad, dd * sizeof *G);
+    tlsph_real G[9], P[9], *grad = s->grad_v + tlsphi_tensor_at(dd, a);
+    tlsphi_tensor_get(s->grad_v, (int)dd, a, G);
     tlsphi_stress_behind(s, h, P);
     for (; h != end; h++)
         for (size_t j = 0; j <= D; j++) { /* column j of S [...], at last the jump at the middle itself */
@@ -4457,7 +4506,7 @@ static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tls
             tlsphi_held_jump(s, h, G, h->part.B[j], h->part.T + D * j, column);
             for (size_t i = 0; i < D; i++) {
                 const tlsph_real change = column[i] / s->V[a];
-                grad[D * i + j] += change;
+                grad[(D * i + j) * TLSPHI_LANES] += change;
                 tlsphi_at(s, s->rows.grad_w, a)[(D * i + j) * TLSPHI_ROW] += change;
                 if (s->rate_E) s->rate_E[a] += P[D * i + j] * change;
             }
@@ -4569,15 +4618,19 @@ typedef struct tlsphi_slopes {
     tlsph_real v[9 * TLSPHI_LANES_MOST], w[9 * TLSPHI_LANES_MOST], S[3 * TLSPHI_LANES_MOST],
         theta[3 * TLSPHI_LANES_MOST];
 } tlsphi_slopes;
-/* Lanes [first, end) to the columns of rows. */
-TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, size_t first, size_t end, tlsph_real *row) {
+/* Lanes [first, end) to the columns of rows `apart` from each other. */
+TLSPHI_INLINE void tlsphi_store_lanes(const int rows, const tlsph_real *lanes, size_t first, size_t end, size_t apart,
+                                      tlsph_real *row) {
     for (size_t i = 0; i < (size_t)rows; i++) {
         const tlsph_real *from = lanes + i * TLSPHI_LANES;
-        tlsph_real *to = row + i * TLSPHI_ROW;
+        tlsph_real *to = row + i * apart;
         if (end - first == TLSPHI_LANES) memcpy(to, from, TLSPHI_LANES * sizeof *to);
         else
             for (size_t l = first; l < end; l++) to[l] = from[l];
     }
+}
+TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, size_t first, size_t end, tlsph_real *row) {
+    tlsphi_store_lanes(rows, lanes, first, end, TLSPHI_ROW, row);
 }
 /* G = scale G M^T for `rows` gradients a lane; M is NULL, or that of the tile's particles as lanes. */
 TLSPHI_INLINE void tlsphi_finish_gradients(const tlsph_real *scale, const tlsph_real *M, const int dim, const int rows,
@@ -4618,7 +4671,8 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
                                     size_t last, const int dim, tlsph_real *G) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *x = s->linear ? s->X : s->now.x, *v = tlsphi_at(s, s->rows.v, base);
-    tlsph_real arm[3 * TLSPHI_LANES_MOST] = {0}, F[9 * TLSPHI_LANES_MOST] = {0}, w[3 * TLSPHI_LANES_MOST];
+    tlsph_real arm[3 * TLSPHI_LANES_MOST] = {0}, unit[9 * TLSPHI_LANES_MOST] = {0}, w[3 * TLSPHI_LANES_MOST];
+    const tlsph_real *F = s->linear ? unit : s->now.F + dd * base;
     tlsph_real spin[3], mean[3], centre[3] = {0, 0, 0};
     for (size_t i = 0; i < 3; i++) {
         spin[i] = (tlsph_real)body->spin[i];
@@ -4626,10 +4680,8 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
         if (i < D) centre[i] = (tlsph_real)((double)x[D * body->first + i] + body->centre[i]);
     }
     tlsphi_take_lanes(x + D * base, D, first, last, arm);
-    if (!s->linear) tlsphi_take_lanes(s->now.F + dd * base, dd, first, last, F);
-    else
-        for (size_t i = 0; i < D; i++)
-            for (size_t l = 0; l < TLSPHI_LANES; l++) F[(D + 1) * i * TLSPHI_LANES + l] = 1;
+    for (size_t i = 0; s->linear && i < D; i++)
+        for (size_t l = 0; l < TLSPHI_LANES; l++) unit[(D + 1) * i * TLSPHI_LANES + l] = 1;
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         TLSPHI_UNROLL for (int k = 0; k <= dim; k++) { /* the columns of F, and the arm */
             tlsph_real column[3] = {0}, turn[3];
@@ -4646,6 +4698,20 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
     }
     tlsphi_store_rows(dim, w, first, last, tlsphi_at(s, s->rows.w, base));
 }
+/* M^T Q/theta = -h/(J theta) A^T A G with A = H M and the raw gradient G = scale sum of theta (000-56). */
+TLSPHI_INLINE void tlsphi_heat_flux_lanes(const tlsph_solver *s, size_t base, const int dim, const tlsph_real *scale,
+                                          const tlsph_real *sum, tlsph_real *heat) {
+    const tlsph_real *row = tlsphi_at(s, s->rows.A, base), *theta = tlsphi_theta(s, base), *h_J = tlsphi_at(s, s->rows.h_J, base);
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real A[9], G[3], push[3], out[3];
+        tlsphi_take_rows(dim * dim, row + l, A);
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) G[i] = sum[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_multiply(dim, A, G, push);
+        tlsphi_multiply_transposed(dim, A, push, out);
+        const tlsph_real factor = -h_J[l] * scale[l] / theta[l];
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) heat[(size_t)i * TLSPHI_LANES + l] = factor * out[i];
+    }
+}
 /* What becomes of the raw sums of the particles [begin, end) of a tile. E without its kinetic part changes by P : grad w
    (see [PROJECTION]), J by H : grad v; PM : (raw sum) and HM : (raw sum) are the same, and adjoint to T_a. */
 TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block *block, size_t begin, size_t end,
@@ -4654,6 +4720,7 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     const int dd = dim * dim;
     tlsph_real *row = tlsphi_at(s, 0, base), *M = NULL;
     tlsph_real correction[9 * TLSPHI_LANES_MOST], scale[TLSPHI_LANES_MOST] = {0}, rate[TLSPHI_LANES_MOST];
+    tlsph_real heat[3 * TLSPHI_LANES_MOST];
     for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
     for (size_t l = first; s->M && l < last; l++)
         TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) correction[i * TLSPHI_LANES + l] =
@@ -4670,9 +4737,7 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     }
     tlsphi_finish_gradients(scale, M, dim, dim, sum->v);
     if (with_w) tlsphi_finish_gradients(scale, M, dim, dim, sum->w);
-    for (size_t l = first; l < last; l++)
-        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) s->grad_v[(size_t)dd * (base + l) + i] =
-            sum->v[i * TLSPHI_LANES + l];
+    tlsphi_store_lanes(dd, sum->v, first, last, TLSPHI_LANES, s->grad_v + (size_t)dd * base);
     if (s->projection && !s->gathers_w) tlsphi_take_turn(s, s->body + block->body, base, first, last, dim, w);
     tlsphi_store_rows(dd, w, first, last, row + (size_t)s->rows.grad_w * TLSPHI_ROW);
     if (with_S) {
@@ -4680,6 +4745,8 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
         tlsphi_store_rows(dim, sum->S, first, last, row + (size_t)s->rows.slope_S * TLSPHI_ROW);
     }
     if (with_theta) {
+        tlsphi_heat_flux_lanes(s, base, dim, scale, sum->theta, heat);
+        tlsphi_store_rows(dim, heat, first, last, row + (size_t)s->rows.heat * TLSPHI_ROW);
         tlsphi_finish_gradients(scale, M, dim, 1, sum->theta);
         tlsphi_store_rows(dim, sum->theta, first, last, row + (size_t)s->rows.slope_theta * TLSPHI_ROW);
     }
@@ -4734,7 +4801,7 @@ static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
     }
     tlsphi_row_get(s, r->PM, (int)dd, a, PM);
     if (s->rate_E) s->rate_E[a] += tlsphi_dot(dim * dim, PM, Gw);
-    for (size_t i = 0; i < dd; i++) s->grad_v[dd * a + i] += G[i];
+    for (size_t i = 0; i < dd; i++) s->grad_v[tlsphi_tensor_at(dd, a) + i * TLSPHI_LANES] += G[i];
     for (size_t i = 0; i < dd; i++) tlsphi_at(s, r->grad_w, a)[i * TLSPHI_ROW] += Gw[i];
 }
 
@@ -4743,7 +4810,9 @@ static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     const tlsphi_rows *r = &s->rows;
     tlsph_real Gw[9], slope[3];
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
-        tlsphi_mirror_tensor(dim, m, s->grad_v + (size_t)dd * a);
+        tlsphi_tensor_get(s->grad_v, dd, a, Gw);
+        tlsphi_mirror_tensor(dim, m, Gw);
+        tlsphi_tensor_put(s->grad_v, dd, a, Gw);
         tlsphi_row_get(s, r->grad_w, dd, a, Gw);
         tlsphi_mirror_tensor(dim, m, Gw);
         tlsphi_row_put(s, r->grad_w, dd, a, Gw);
@@ -4757,7 +4826,7 @@ static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     }
 }
 
-/* M^T Q / theta with Q = -h/J H^T H grad theta (000-56). Q is mirrored like the gradient, so that both stay adjoint. */
+/* The same from the gradient, where that is not the raw sum's. Q = -h/J H^T H grad theta is mirrored like the gradient, so that both stay adjoint. */
 static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
     const int dim = s->dim;
     tlsphi_point pt;
@@ -4777,12 +4846,13 @@ static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
 
 /* dJ/dt = H : grad v where grad v is not the raw sum's; the dissipation is added by the fluxes. */
 static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
-    const size_t D = (size_t)s->dim;
+    const int dd = s->dim * s->dim;
     tlsphi_point pt;
-    tlsph_real H[9];
+    tlsph_real H[9], G[9];
     tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
     tlsphi_shrink(s->dim, pt.H, H);
-    s->rate_J[a] = tlsphi_dot(s->dim * s->dim, H, s->rate_F + D * D * a);
+    tlsphi_tensor_get(s->rate_F, dd, a, G);
+    s->rate_J[a] = tlsphi_dot(dd, H, G);
 }
 
 /* The odd part of a vector across an image's mirror; the image's share in grad v (for w it is the same, because the rigid
@@ -4799,9 +4869,8 @@ static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *ima
     memcpy(odd, s->v + D * a, D * sizeof *odd);
     tlsphi_odd_part(image, s->dim, odd);
     for (size_t i = 0; i < D; i++) {
-        const size_t at = D * D * a + D * i + axis;
         const size_t row = (D * i + axis) * TLSPHI_ROW;
-        s->grad_v[at] += factor * odd[i];
+        s->grad_v[tlsphi_tensor_at(D * D, a) + (D * i + axis) * TLSPHI_LANES] += factor * odd[i];
         tlsphi_at(s, s->rows.grad_w, a)[row] += factor * odd[i];
         if (s->rate_E) s->rate_E[a] += tlsphi_at(s, s->rows.PM, a)[row] * factor * odd[i];
     }
@@ -4825,14 +4894,16 @@ static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
    second part. */
 static void tlsphi_turn_gradient(tlsph_solver *s, const double spin[3], size_t a) {
     const size_t D = (size_t)s->dim, dd = D * D;
-    tlsph_real *rate = s->rate_F + dd * a, G[9];
+    tlsph_real F[9], G[9];
     tlsphi_row_get(s, s->rows.grad_w, (int)dd, a, G);
+    tlsphi_tensor_get(s->now.F, (int)dd, a, F);
     for (size_t j = 0; j < D; j++) {
         double column[3] = {0, 0, 0}, turn[3];
-        for (size_t i = 0; i < D; i++) column[i] = (double)s->now.F[dd * a + D * i + j];
+        for (size_t i = 0; i < D; i++) column[i] = (double)F[D * i + j];
         tlsphi_cross3(spin, column, turn);
-        for (size_t i = 0; i < D; i++) rate[D * i + j] = G[D * i + j] + (tlsph_real)turn[i];
+        for (size_t i = 0; i < D; i++) G[D * i + j] += (tlsph_real)turn[i];
     }
+    tlsphi_tensor_put(s->rate_F, (int)dd, a, G);
 }
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     const int with_S = s->has_J && s->damps, with_theta = s->heat_moves;
@@ -4844,7 +4915,7 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
         if (s->dim == 3) tlsphi_gradient_tile(s, block, tile, a, end, 3, with_w, with_S, with_theta);
         else tlsphi_gradient_tile(s, block, tile, a, end, 2, with_w, with_S, with_theta);
     }
-    if (!s->rest && !s->mirrors && !s->images && !s->held_parts && !with_theta && !s->turns) return;
+    if (!s->rest && !s->mirrors && !s->images && !s->held_parts && !s->turns) return;
     tlsphi_held_part *held = tlsphi_find_held_part(s, block->begin), *const parts = s->held_part + s->held_parts;
     for (size_t a = block->begin; a < block->end; a++) {
         const int mirrored = tlsphi_mirrors_of(s, a) != NULL, imaged = image != last && image->particle == a;
@@ -4856,7 +4927,7 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
         if (mirrored) tlsphi_mirror_gradients(s, a);
         if (s->turns) tlsphi_turn_gradient(s, s->body[block->body].spin, a);
         if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || held != from || s->turns)) tlsphi_jacobian_rate(s, a);
-        if (with_theta) tlsphi_heat_flux(s, a);
+        if (with_theta && (s->rest || mirrored)) tlsphi_heat_flux(s, a); /* their gradients are not the raw sums */
     }
 }
 
@@ -4878,15 +4949,16 @@ TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int 
                                      tlsph_real *relative, tlsph_real *moment) {
     const size_t D = (size_t)dim;
     const int dd = dim * dim;
-    tlsph_real P_a[9], w_a[9];
+    tlsph_real P_a[9], w_a[9], g_a[9];
     tlsphi_row_get(s, s->rows.PM, dd, a, P_a);
     tlsphi_row_get(s, s->rows.grad_w, dd, a, w_a);
+    tlsphi_tensor_get(s->grad_v, dd, a, g_a);
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
-        const tlsph_real *g_a = s->grad_v + (size_t)dd * a, *g_b = s->grad_v + (size_t)dd * b;
         tlsph_real d[3], change[9], jump[3];
+        tlsphi_tensor_get(s->grad_v, dd, b, change);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
-        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] = g_b[i] - g_a[i];
+        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] -= g_a[i];
         tlsphi_multiply(dim, change, d, jump);
         tlsphi_add_outer(dim, correction, jump, s->g + D * k);
         tlsphi_row_get(s, s->rows.grad_w, dd, b, change);
@@ -4904,7 +4976,7 @@ static void tlsphi_mirror_all(const tlsph_solver *s, size_t a, tlsph_real *G) {
         tlsphi_mirror_tensor(s->dim, m, G);
 }
 TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int dim) {
-    const size_t dd = (size_t)(dim * dim);
+    const size_t dd = (size_t)(dim * dim), at = tlsphi_tensor_at(dd, a);
     const tlsph_real sixth = 1 / (6 * s->V[a]), reach = sixth * TLSPHI_R(TLSPHI_SHARP_REACH);
     tlsph_real correction[9] = {0}, moment[9] = {0}, relative[9] = {0}, P[9], slope[9];
     tlsphi_sharp_sums(s, a, dim, correction, relative, moment);
@@ -4915,7 +4987,7 @@ TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int 
     tlsphi_row_get(s, s->rows.grad_w, (int)dd, a, slope);
     if (s->rate_E) s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, P, relative);
     for (size_t i = 0; i < dd; i++) {
-        s->rate_F[dd * a + i] = s->grad_v[dd * a + i] - sixth * correction[i];
+        s->rate_F[at + i * TLSPHI_LANES] = s->grad_v[at + i * TLSPHI_LANES] - sixth * correction[i];
         slope[i] -= reach * relative[i];
         P[i] += sixth * moment[i];
     }
@@ -5602,8 +5674,10 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
             load->X[3 * i + k] = k < D ? s->X[at] : 0;
             load->x[3 * i + k] = k < D ? s->now.x[at] : 0;
             if (!load->part || k >= D) continue;
+            tlsph_real F[9];
+            tlsphi_tensor_get(s->now.F, s->dim * s->dim, load->inner[i], F);
             load->X[3 * i + k] += load->part[i].o[k];
-            load->x[3 * i + k] += tlsphi_any_dot(s->dim, s->now.F + D * at, load->part[i].o);
+            load->x[3 * i + k] += tlsphi_any_dot(s->dim, F + D * k, load->part[i].o);
         }
     load->given.values(load->given.values_user, (tlsph_real)time, count, load->host, load->X, load->x, load->values);
 }
@@ -6256,7 +6330,7 @@ static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
     for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
         const tlsphi_material *m = tlsphi_material_of(s, a);
         tlsphi_point pt, next;
-        tlsph_real H[9], gain = 0;
+        tlsph_real H[9], G[9], gain = 0;
         tlsphi_load_measures(s, q->first_stage ? &s->old : &s->now, m, a, &pt);
         tlsphi_shrink(s->dim, pt.H, H);
         tlsphi_mirror_all(s, a, H);
@@ -6266,7 +6340,8 @@ static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
             tlsphi_load_measures(s, &s->now, m, a, &next);
             for (int k = 0; k < 9; k++) next.H[k] -= pt.H[k];
             tlsphi_shrink(s->dim, next.H, H);
-            gain = tlsphi_dot((int)dd, H, s->rate_F + dd * a);
+            tlsphi_tensor_get(s->rate_F, (int)dd, a, G);
+            gain = tlsphi_dot((int)dd, H, G);
         }
         s->pressure.b[a] = s->V[a] * ((pt.d - 1) / (tlsph_real)q->T + gain);
         for (size_t k = 0; k < D; k++) s->v[D * a + k] = s->now.p[D * a + k] / m->rho;
@@ -6796,17 +6871,35 @@ static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double d
    sum over the body is -sum (w.T_D + Sigma_J D_J) as before, so that the energy is conserved to round-off. Given up: within
    a step w may turn against T_D, so that a share, and the production of a pair, may be negative by O(dt) of itself. */
 
-/* dH/dt = F x grad v with F of state u. */
-TLSPHI_INLINE void tlsphi_update_cofactor(tlsph_solver *s, const tlsphi_state *u, size_t a, const int dim, tlsph_real B,
-                                          tlsph_real C) {
-    const size_t dd = (size_t)(dim * dim);
-    tlsph_real F[9], G[9], rate[9], in_plane[9], *now = s->now.H + dd * a;
-    const tlsph_real *old = s->old.H + dd * a, *H = u->H + dd * a;
-    tlsphi_expand(dim, u->F + dd * a, 1, F);
-    tlsphi_expand(dim, s->rate_F + dd * a, 0, G);
-    tlsphi_cross_inline(F, G, rate);
-    tlsphi_shrink(dim, rate, in_plane);
-    TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) now[i] = old[i] + B * (H[i] - old[i]) + C * in_plane[i];
+/* dH/dt = F x grad v with F of state u, for the lanes [first, last) of the tile at `base`. */
+TLSPHI_INLINE void tlsphi_cofactor_lanes(tlsph_solver *s, const tlsphi_state *u, size_t base, size_t first, size_t last,
+                                         const int dim, tlsph_real B, tlsph_real C) {
+    const size_t dd = (size_t)(dim * dim), at = dd * base;
+    const tlsph_real *u_F = u->F + at, *u_H = u->H + at, *rate_F = s->rate_F + at, *old = s->old.H + at;
+    tlsph_real *now = s->now.H + at;
+    TLSPHI_EACH_LANE for (size_t l = first; l < last; l++) {
+        tlsph_real in[9], G_in[9], F[9], G[9], rate[9], out[9];
+        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) in[i] = u_F[i * TLSPHI_LANES + l];
+        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) G_in[i] = rate_F[i * TLSPHI_LANES + l];
+        tlsphi_expand(dim, in, 1, F);
+        tlsphi_expand(dim, G_in, 0, G);
+        tlsphi_cross_inline(F, G, rate);
+        tlsphi_shrink(dim, rate, out);
+        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) {
+            const size_t k = i * TLSPHI_LANES + l;
+            now[k] = old[k] + B * (u_H[k] - old[k]) + C * out[i];
+        }
+    }
+}
+static void tlsphi_update_cofactors(tlsph_solver *s, const tlsphi_state *u, const tlsphi_block *block, tlsph_real B,
+                                    tlsph_real C) {
+    for (size_t a = block->begin, end; a < block->end; a = end) {
+        const size_t first = a % TLSPHI_LANES, base = a - first;
+        end = tlsphi_tile_end(block, a);
+        if (s->dim == 2) tlsphi_cofactor_lanes(s, u, base, first, end - base, 2, B, C);
+        else if (end - a == TLSPHI_LANES) tlsphi_cofactor_lanes(s, u, base, 0, TLSPHI_LANES, 3, B, C);
+        else tlsphi_cofactor_lanes(s, u, base, first, end - base, 3, B, C);
+    }
 }
 /* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
 static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
@@ -6818,6 +6911,20 @@ static void tlsphi_combine(tlsph_real *now, const tlsph_real *old, const tlsph_r
                            size_t begin, size_t end, tlsph_real B, tlsph_real C) {
     for (size_t i = begin; i < end; i++) now[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
 }
+/* The same for F of the particles [begin, end): whole tiles at once, of others the lanes that belong to them. */
+static void tlsphi_combine_gradients(tlsph_solver *s, const tlsphi_state *u, size_t begin, size_t end, tlsph_real B,
+                                     tlsph_real C) {
+    const size_t dd = (size_t)(s->dim * s->dim), whole = end / TLSPHI_LANES * TLSPHI_LANES;
+    for (size_t a = begin, next; a < end; a = next) {
+        const int aligned = a % TLSPHI_LANES == 0 && a < whole;
+        next = aligned ? whole : a / TLSPHI_LANES == end / TLSPHI_LANES ? end : (a / TLSPHI_LANES + 1) * TLSPHI_LANES;
+        if (aligned) tlsphi_combine(s->now.F, s->old.F, u->F, s->rate_F, dd * a, dd * next, B, C);
+        for (size_t i = 0; !aligned && i < dd; i++) {
+            const size_t at = tlsphi_tensor_at(dd, a) + i * TLSPHI_LANES;
+            tlsphi_combine(s->now.F, s->old.F, u->F, s->rate_F, at, at + (next - a), B, C);
+        }
+    }
+}
 typedef struct tlsphi_update {
     tlsph_solver *s;
     const tlsphi_state *u; /* the state before the stage */
@@ -6827,17 +6934,14 @@ typedef struct tlsphi_update {
 static void tlsphi_update_task(void *arg, size_t i) {
     const tlsphi_update *up = (const tlsphi_update *)arg;
     tlsph_solver *s = up->s;
-    const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
+    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real B = up->B, C = up->C;
     const tlsphi_state *u = up->u;
-    for (size_t a = begin; s->has_H && a < end; a++) {
-        if (s->dim == 3) tlsphi_update_cofactor(s, u, a, 3, B, C);
-        else tlsphi_update_cofactor(s, u, a, 2, B, C);
-    }
+    if (s->has_H) tlsphi_update_cofactors(s, u, s->block + i, B, C);
     for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
     tlsphi_combine(s->now.x, s->old.x, u->x, s->v, D * begin, D * end, B, C);
     tlsphi_combine(s->now.p, s->old.p, u->p, s->rate_p, D * begin, D * end, B, C);
-    tlsphi_combine(s->now.F, s->old.F, u->F, s->rate_F, dd * begin, dd * end, B, C);
+    tlsphi_combine_gradients(s, u, begin, end, B, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, u->J, s->rate_J, begin, end, B, C);
     if (s->now.E) tlsphi_combine(s->now.E, s->old.E, u->E, s->rate_E, begin, end, B, C);
 }
@@ -7034,14 +7138,11 @@ typedef struct tlsphi_leap_move {
 static void tlsphi_drift_task(void *arg, size_t i) {
     const tlsphi_leap_move *drift = (const tlsphi_leap_move *)arg;
     tlsph_solver *s = drift->s;
-    const size_t D = (size_t)s->dim, dd = D * D, begin = s->block[i].begin, end = s->block[i].end;
+    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
-    for (size_t a = begin; s->has_H && a < end; a++) {
-        if (s->dim == 3) tlsphi_update_cofactor(s, &s->now, a, 3, 0, C);
-        else tlsphi_update_cofactor(s, &s->now, a, 2, 0, C);
-    }
+    if (s->has_H) tlsphi_update_cofactors(s, &s->now, s->block + i, 0, C);
     tlsphi_combine(s->now.x, s->old.x, s->now.x, s->v, D * begin, D * end, 0, C);
-    tlsphi_combine(s->now.F, s->old.F, s->now.F, s->rate_F, dd * begin, dd * end, 0, C);
+    tlsphi_combine_gradients(s, &s->now, begin, end, 0, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, on, C);
     if (s->thermal == TLSPH_ENERGY || (s->thermal && drift->on))
         tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, on, C);
@@ -7230,14 +7331,15 @@ static void tlsphi_deform_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim, dd = D * D;
     const tlsph_real dt = s->rates.elapsed;
     for (size_t a = block->begin; a < block->end; a++) {
-        tlsph_real *F = s->now.F + dd * a, *G = s->rate_F + dd * a, old[9], rate[9], H[9], in_plane[9];
+        tlsph_real G[9], old[9], rate[9], H[9], in_plane[9];
+        tlsphi_tensor_get(s->rate_F, (int)dd, a, G);
         for (size_t j = 0; s->turns && j < D; j++) { /* G has spin x F in it: make it that of the middle */
             double column[3] = {0, 0, 0}, turn[3];
             for (size_t i = 0; i < D; i++) column[i] = (double)G[D * i + j];
             tlsphi_cross3(s->body[block->body].spin, column, turn);
             for (size_t i = 0; i < D; i++) G[D * i + j] += dt / 2 * (tlsph_real)turn[i];
         }
-        tlsphi_expand(s->dim, F, 1, old);
+        tlsphi_tensor_expand(s->now.F, s->dim, a, 1, old);
         tlsphi_expand(s->dim, G, 0, rate);
         if (s->has_J) {
             tlsphi_cross_inline(old, rate, H);
@@ -7249,9 +7351,9 @@ static void tlsphi_deform_block(tlsph_solver *s, tlsphi_block *block) {
             for (int i = 0; i < 9; i++) old[i] += dt / 2 * rate[i];
             tlsphi_cross_inline(old, rate, H);
             tlsphi_shrink(s->dim, H, in_plane);
-            for (size_t i = 0; i < dd; i++) s->now.H[dd * a + i] += dt * in_plane[i];
+            for (size_t i = 0; i < dd; i++) s->now.H[tlsphi_tensor_at(dd, a) + i * TLSPHI_LANES] += dt * in_plane[i];
         }
-        for (size_t i = 0; i < dd; i++) F[i] += dt * G[i];
+        for (size_t i = 0; i < dd; i++) s->now.F[tlsphi_tensor_at(dd, a) + i * TLSPHI_LANES] += dt * G[i];
     }
 }
 /* A pass sees no stresses but those of its own level: they act once and go. */
@@ -7709,8 +7811,8 @@ static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field
     case TLSPH_FIELD_VELOCITY: tlsphi_out_vector(dim, s->now.p + D * a, 1 / rho, out); return 1;
     case TLSPH_FIELD_MOMENTUM: tlsphi_out_vector(dim, s->now.p + D * a, 1, out); return 1;
     case TLSPH_FIELD_BOUNDARY_AREA: tlsphi_out_vector(dim, s->B + D * a, 1, out); return 1;
-    case TLSPH_FIELD_F: tlsphi_expand(dim, s->now.F + D * D * a, 1, out); return 1;
-    case TLSPH_FIELD_VELOCITY_GRADIENT: tlsphi_expand(dim, s->rate_F + D * D * a, 0, out); return 1;
+    case TLSPH_FIELD_F: tlsphi_tensor_expand(s->now.F, dim, a, 1, out); return 1;
+    case TLSPH_FIELD_VELOCITY_GRADIENT: tlsphi_tensor_expand(s->rate_F, dim, a, 0, out); return 1;
     case TLSPH_FIELD_VOLUME: *out = s->V[a]; return 1;
     case TLSPH_FIELD_MASS: *out = s->V[a] * rho; return 1;
     case TLSPH_FIELD_NEIGHBOURS: *out = (tlsph_real)(s->first[a + 1] - s->first[a]); return 1;
@@ -7783,15 +7885,15 @@ TLSPHI_DEF tlsph_result tlsph_read(const tlsph_solver *s, tlsph_field field, tls
 
 /* Sets F of one particle and what follows from it. */
 static void tlsphi_write_gradient(tlsph_solver *s, size_t a, const tlsph_real *F) {
-    const int dim = s->dim;
-    const size_t dd = (size_t)(dim * dim);
-    const int linear = tlsphi_material_of(s, a)->kind == TLSPH_LINEAR;
-    tlsph_real full[9], H[9];
-    tlsphi_shrink(dim, F, s->now.F + dd * a);
-    tlsphi_expand(dim, s->now.F + dd * a, 1, full);
+    const int dim = s->dim, linear = tlsphi_material_of(s, a)->kind == TLSPH_LINEAR;
+    tlsph_real in_plane[9], full[9], H[9];
+    tlsphi_shrink(dim, F, in_plane);
+    tlsphi_expand(dim, in_plane, 1, full);
+    tlsphi_tensor_put(s->now.F, dim * dim, a, in_plane);
     if (s->has_H) {
         tlsph_cofactor(full, H);
-        tlsphi_shrink(dim, H, s->now.H + dd * a);
+        tlsphi_shrink(dim, H, in_plane);
+        tlsphi_tensor_put(s->now.H, dim * dim, a, in_plane);
     }
     if (s->has_J) s->now.J[a] = linear ? full[0] + full[4] + full[8] - 2 : tlsph_determinant(full);
 }
@@ -7910,27 +8012,35 @@ static tlsph_real tlsphi_get_real(const unsigned char **at) {
     return x;
 }
 
-/* The state arrays with their components, in the order of the checkpoint. */
-static int tlsphi_state_arrays(const tlsph_solver *s, tlsph_real *array[8], size_t components[8]) {
-    const size_t D = (size_t)s->dim;
-    tlsph_real *const all[8] = {s->now.x, s->now.p, s->now.F,       s->now.H,
-                                s->now.J, s->now.E, s->now.plastic, s->now.q};
-    const size_t sizes[8] = {D, D, D * D, D * D, 1, 1, tlsphi_plastic_reals(s->dim, s->thermal), 1};
+/* The state arrays in the order of the checkpoint, with their components and how far these lie apart. */
+typedef struct tlsphi_saved {
+    tlsph_real *array;
+    size_t components, apart;
+} tlsphi_saved;
+static int tlsphi_state_arrays(const tlsph_solver *s, tlsphi_saved out[8]) {
+    const size_t D = (size_t)s->dim, DD = D * D, L = TLSPHI_LANES;
+    const tlsphi_saved all[8] = {{s->now.x, D, 1}, {s->now.p, D, 1}, {s->now.F, DD, L}, {s->now.H, DD, L},
+                                 {s->now.J, 1, 1}, {s->now.E, 1, 1},
+                                 {s->now.plastic, tlsphi_plastic_reals(s->dim, s->thermal), 1}, {s->now.q, 1, 1}};
     int count = 0;
-    for (int i = 0; i < 8; i++) {
-        if (!all[i]) continue;
-        array[count] = all[i];
-        components[count++] = sizes[i];
-    }
+    for (int i = 0; i < 8; i++)
+        if (all[i].array) out[count++] = all[i];
     return count;
 }
+/* Component i of the particle with host's number h. */
+static tlsph_real *tlsphi_saved_at(const tlsph_solver *s, const tlsphi_saved *saved, size_t h, size_t i) {
+    const size_t a = s->inner[h], first = saved->apart > 1 ? tlsphi_tensor_at(saved->components, a) : saved->components * a;
+    return saved->array + first + i * saved->apart;
+}
 TLSPHI_DEF size_t tlsph_save_size(const tlsph_solver *s) {
-    return TLSPHI_HEADER + s->state_reals * sizeof(tlsph_real) + 8;
+    tlsphi_saved saved[8];
+    size_t reals = 0;
+    for (int k = tlsphi_state_arrays(s, saved); k-- > 0;) reals += saved[k].components * s->n;
+    return TLSPHI_HEADER + reals * sizeof(tlsph_real) + 8;
 }
 TLSPHI_DEF tlsph_result tlsph_save(const tlsph_solver *s, void *buffer, size_t size) {
     unsigned char *at = (unsigned char *)buffer;
-    tlsph_real *array[8];
-    size_t components[8];
+    tlsphi_saved saved[8];
     double accounts[TLSPHI_ACCOUNTS];
     if (!buffer) return TLSPH_ERROR_ARGUMENT;
     if (size < tlsph_save_size(s)) return TLSPH_ERROR_SIZE;
@@ -7944,10 +8054,10 @@ TLSPHI_DEF tlsph_result tlsph_save(const tlsph_solver *s, void *buffer, size_t s
     tlsphi_put_double(&at, s->last_dt);
     memcpy(accounts, &s->account, sizeof accounts);
     for (size_t i = 0; i < TLSPHI_ACCOUNTS; i++) tlsphi_put_double(&at, accounts[i]);
-    const int arrays = tlsphi_state_arrays(s, array, components);
+    const int arrays = tlsphi_state_arrays(s, saved);
     for (int k = 0; k < arrays; k++)
         for (size_t h = 0; h < s->n; h++)
-            for (size_t i = 0; i < components[k]; i++) tlsphi_put_real(&at, array[k][components[k] * s->inner[h] + i]);
+            for (size_t i = 0; i < saved[k].components; i++) tlsphi_put_real(&at, *tlsphi_saved_at(s, saved + k, h, i));
     tlsphi_put(&at, tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)buffer, tlsph_save_size(s) - 8), 8);
     return TLSPH_OK;
 }
@@ -7970,8 +8080,7 @@ static tlsph_result tlsphi_check_checkpoint(tlsph_solver *s, const unsigned char
 }
 TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_t size) {
     const unsigned char *at = (const unsigned char *)buffer;
-    tlsph_real *array[8];
-    size_t components[8];
+    tlsphi_saved saved[8];
     double accounts[TLSPHI_ACCOUNTS];
     if (!buffer)
         return tlsphi_fail(&s->error, TLSPH_ERROR_ARGUMENT, "restore", "buffer", TLSPH_NO_PARTICLE, 0, 0, "not NULL");
@@ -7984,10 +8093,10 @@ TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_
     tlsphi_keep_state(s);
     for (size_t i = 0; i < TLSPHI_ACCOUNTS; i++) accounts[i] = tlsphi_get_double(&at);
     memcpy(&s->account, accounts, sizeof accounts);
-    const int arrays = tlsphi_state_arrays(s, array, components);
+    const int arrays = tlsphi_state_arrays(s, saved);
     for (int k = 0; k < arrays; k++)
         for (size_t h = 0; h < s->n; h++)
-            for (size_t i = 0; i < components[k]; i++) array[k][components[k] * s->inner[h] + i] = tlsphi_get_real(&at);
+            for (size_t i = 0; i < saved[k].components; i++) *tlsphi_saved_at(s, saved + k, h, i) = tlsphi_get_real(&at);
     const int finite = tlsphi_finite((tlsph_real)time) && tlsphi_all_finite(s->now_memory, s->state_reals);
     if (!finite || tlsphi_evaluate(s)) { /* a checksum can be forged */
         tlsphi_restore_state(s);
@@ -8713,8 +8822,9 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
 
 static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
     const size_t D = (size_t)s->dim, n = s->n;
-    s->state_reals = n * (2 * D + D * D + (s->has_H ? D * D : 0) + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0) +
-                          (s->incompressible ? 1 : 0) +
+    const size_t tensor = tlsphi_tensor_reals(n, D * D);
+    s->state_reals = tensor * (s->has_H ? 2 : 1) +
+                     n * (2 * D + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0) + (s->incompressible ? 1 : 0) +
                           (s->has_plastic ? tlsphi_plastic_reals(s->dim, s->thermal) : 0));
     s->now_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
     s->old_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
@@ -8723,16 +8833,16 @@ static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
         tlsphi_state *u = i ? &s->old : &s->now;
         tlsph_real *at = i ? s->old_memory : s->now_memory;
         memset(u, 0, sizeof *u);
+        u->F = at; /* first, on a boundary of cache lines */
+        at += tensor;
+        if (s->has_H) {
+            u->H = at;
+            at += tensor;
+        }
         u->x = at;
         at += D * n;
         u->p = at;
         at += D * n;
-        u->F = at;
-        at += D * D * n;
-        if (s->has_H) {
-            u->H = at;
-            at += D * D * n;
-        }
         if (s->has_J) {
             u->J = at;
             at += n;
@@ -8748,10 +8858,10 @@ static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
 static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     const size_t D = (size_t)s->dim, n = s->n;
     s->rate_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
-    s->rate_F = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    s->rate_F = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D));
     s->v = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
-    s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, D * D * n) : s->rate_F;
+    s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D)) : s->rate_F;
     if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
     if (s->rates.levels > 1) {
         s->rates.of = TLSPHI_TAKE(arena, uint8_t, n);
@@ -8894,8 +9004,8 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
         for (size_t i = 0; i < D; i++) {
             s->X[D * a + i] = s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
             tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW] = s->X[D * a + i];
-            s->now.F[D * D * a + (D + 1) * i] = 1;
-            if (s->has_H) s->now.H[D * D * a + (D + 1) * i] = 1;
+            s->now.F[tlsphi_tensor_at(D * D, a) + (D + 1) * i * TLSPHI_LANES] = 1;
+            if (s->has_H) s->now.H[tlsphi_tensor_at(D * D, a) + (D + 1) * i * TLSPHI_LANES] = 1;
         }
         if (s->has_J) s->now.J[a] = 1;
         if (s->now.plastic)
