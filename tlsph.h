@@ -1438,8 +1438,11 @@ static void tlsphi_grid_hash(tlsphi_grid *grid) {
    What neighbours read lies in rows, one a component of a block of particles, so that the lanes of a component lie side by
    side. On a lattice the particles of a tile mostly have their k-th neighbours side by side, too (see [TILES]); others are
    gathered into spare columns at the end of the rows of their own block. */
-#define TLSPHI_LANES (sizeof(tlsph_real) == 8 ? 8 : 16)
-#define TLSPHI_LANES_MOST 16
+#ifdef TLSPH_REAL_FLOAT
+#define TLSPHI_LANES 16
+#else
+#define TLSPHI_LANES 8
+#endif
 #define TLSPHI_ROW (TLSPHI_BLOCK + TLSPHI_LANES)
 
 /* Pairs by tiles of TLSPHI_LANES particles: a slot is one neighbour for each lane. */
@@ -3902,7 +3905,7 @@ static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state 
 
 /* One callback for the run of particles [begin, end) that share a user's material. */
 static void tlsphi_user_responses(const tlsph_solver *s, size_t begin, size_t end, tlsph_response *out) {
-    tlsph_real F[9 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST];
+    tlsph_real F[9 * TLSPHI_LANES], J[TLSPHI_LANES];
     for (size_t start = begin, stop; start < end; start = stop) {
         const tlsphi_material *m = tlsphi_material_of(s, start);
         for (stop = start; stop < end && tlsphi_material_of(s, stop) == m; stop++) {
@@ -4049,7 +4052,7 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
 /* A tile's state as lanes. */
 typedef struct tlsphi_state_lanes {
     const tlsph_real *F, *H;
-    tlsph_real v[3 * TLSPHI_LANES_MOST], J[TLSPHI_LANES_MOST], E[TLSPHI_LANES_MOST], c_p[TLSPHI_LANES_MOST], heat[TLSPHI_LANES_MOST], good[TLSPHI_LANES_MOST];
+    tlsph_real v[3 * TLSPHI_LANES], J[TLSPHI_LANES], E[TLSPHI_LANES], c_p[TLSPHI_LANES], heat[TLSPHI_LANES], good[TLSPHI_LANES];
 } tlsphi_state_lanes;
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
@@ -4162,7 +4165,7 @@ static void tlsphi_constitute_tile(const tlsph_solver *s, const tlsphi_material 
 }
 /* P M and H M in the rows of a tile. */
 TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, const int dim) {
-    tlsph_real lanes[9 * TLSPHI_LANES_MOST];
+    tlsph_real lanes[9 * TLSPHI_LANES];
     tlsphi_transpose(M, (size_t)(dim * dim), lanes);
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsph_real A[9], B[9], C[9];
@@ -4235,7 +4238,7 @@ static int tlsphi_evaluate_lanes(tlsph_solver *s, tlsphi_block *block, size_t be
     return s->dim == 3 ? tlsphi_evaluate_tile(s, block, begin, 3) : tlsphi_evaluate_tile(s, block, begin, 2);
 }
 static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
-    tlsph_response user[TLSPHI_LANES_MOST];
+    tlsph_response user[TLSPHI_LANES];
     block->failed = TLSPHI_NONE;
     block->time_step = block->heat_step = TLSPHI_LARGEST;
     for (size_t begin = block->begin, end; begin < block->end; begin = end) {
@@ -4582,7 +4585,7 @@ TLSPHI_INLINE const tlsph_real *tlsphi_gather(const tlsph_solver *s, const tlsph
                                               const tlsphi_slot *slot, int first, int end) {
     if (!slot->scattered) return tlsphi_at(s, 0, slot->from);
     tlsph_real *spare = s->row + (size_t)(block - s->block) * (size_t)s->rows.count * TLSPHI_ROW + TLSPHI_BLOCK;
-    size_t at[TLSPHI_LANES_MOST];
+    size_t at[TLSPHI_LANES];
     for (size_t l = 0; l < TLSPHI_LANES; l++) {
         const size_t b = graph->gathered[slot->from + l];
         at[l] = b / TLSPHI_BLOCK * (size_t)s->rows.count * TLSPHI_ROW + b % TLSPHI_BLOCK;
@@ -4615,8 +4618,8 @@ TLSPHI_INLINE void tlsphi_correct_slope(const tlsph_solver *s, size_t a, const i
 }
 /* Raw sums of a tile: v and w, Sigma_J, theta; by rows of lanes. */
 typedef struct tlsphi_slopes {
-    tlsph_real v[9 * TLSPHI_LANES_MOST], w[9 * TLSPHI_LANES_MOST], S[3 * TLSPHI_LANES_MOST],
-        theta[3 * TLSPHI_LANES_MOST];
+    tlsph_real v[9 * TLSPHI_LANES], w[9 * TLSPHI_LANES], S[3 * TLSPHI_LANES],
+        theta[3 * TLSPHI_LANES];
 } tlsphi_slopes;
 /* Lanes [first, end) to the columns of rows `apart` from each other. */
 TLSPHI_INLINE void tlsphi_store_lanes(const int rows, const tlsph_real *lanes, size_t first, size_t end, size_t apart,
@@ -4671,7 +4674,7 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
                                     size_t last, const int dim, tlsph_real *G) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *x = s->linear ? s->X : s->now.x, *v = tlsphi_at(s, s->rows.v, base);
-    tlsph_real arm[3 * TLSPHI_LANES_MOST] = {0}, unit[9 * TLSPHI_LANES_MOST] = {0}, w[3 * TLSPHI_LANES_MOST];
+    tlsph_real arm[3 * TLSPHI_LANES] = {0}, unit[9 * TLSPHI_LANES] = {0}, w[3 * TLSPHI_LANES];
     const tlsph_real *F = s->linear ? unit : s->now.F + dd * base;
     tlsph_real spin[3], mean[3], centre[3] = {0, 0, 0};
     for (size_t i = 0; i < 3; i++) {
@@ -4719,8 +4722,8 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
     const int dd = dim * dim;
     tlsph_real *row = tlsphi_at(s, 0, base), *M = NULL;
-    tlsph_real correction[9 * TLSPHI_LANES_MOST], scale[TLSPHI_LANES_MOST] = {0}, rate[TLSPHI_LANES_MOST];
-    tlsph_real heat[3 * TLSPHI_LANES_MOST];
+    tlsph_real correction[9 * TLSPHI_LANES], scale[TLSPHI_LANES] = {0}, rate[TLSPHI_LANES];
+    tlsph_real heat[3 * TLSPHI_LANES];
     for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
     for (size_t l = first; s->M && l < last; l++)
         TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) correction[i * TLSPHI_LANES + l] =
@@ -4848,7 +4851,7 @@ static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
 static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
     const int dd = s->dim * s->dim;
     tlsphi_point pt;
-    tlsph_real H[9], G[9];
+    tlsph_real H[9], G[9] = {0};
     tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
     tlsphi_shrink(s->dim, pt.H, H);
     tlsphi_tensor_get(s->rate_F, dd, a, G);
@@ -5330,18 +5333,20 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, int parts,
 }
 
 static void tlsphi_flux_one_by_one(const tlsph_solver *s, size_t begin, size_t end, int parts, tlsphi_gathered *out) {
-    for (size_t a = begin; a < end; a++) {
-        if (s->dim == 3) tlsphi_flux_pairs(s, a, parts, 3, out + (a - begin));
-        else tlsphi_flux_pairs(s, a, parts, 2, out + (a - begin));
+    memset(out, 0, (end - begin) * sizeof *out);
+    for (size_t a = begin; a < end; a++, out++) {
+        out->least = TLSPHI_LARGEST;
+        if (s->dim == 3) tlsphi_flux_pairs(s, a, parts, 3, out);
+        else tlsphi_flux_pairs(s, a, parts, 2, out);
     }
 }
 
 /* -- the pairs of a tile, slot by slot -- */
 
 typedef struct tlsphi_lane_sums {
-    tlsph_real T[3 * TLSPHI_LANES_MOST], damped[3 * TLSPHI_LANES_MOST];
-    tlsph_real J[TLSPHI_LANES_MOST], production[TLSPHI_LANES_MOST];
-    tlsph_real heat[TLSPHI_LANES_MOST], source[TLSPHI_LANES_MOST], conduction[TLSPHI_LANES_MOST];
+    tlsph_real T[3 * TLSPHI_LANES], damped[3 * TLSPHI_LANES];
+    tlsph_real J[TLSPHI_LANES], production[TLSPHI_LANES];
+    tlsph_real heat[TLSPHI_LANES], source[TLSPHI_LANES], conduction[TLSPHI_LANES];
 } tlsphi_lane_sums;
 
 TLSPHI_INLINE void tlsphi_stress_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
@@ -5377,7 +5382,8 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
 TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
                                     const tlsph_real *pattern, const int dim, const int with_J, const int kind,
                                     const int with_front, tlsph_real jump_share, tlsphi_lane_sums *out) {
-    tlsph_real approaches[TLSPHI_LANES_MOST], any = 0;
+    tlsph_real approaches[TLSPHI_LANES];
+    int any = 0;
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_damp_side side_a, side_b;
         tlsphi_damping flux;
@@ -5392,8 +5398,8 @@ TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, c
         out->production[l] = flux.production;
         approaches[l] = flux.approaches;
     }
-    for (size_t l = 0; l < TLSPHI_LANES; l++) any += approaches[l];
-    return any > 0;
+    for (size_t l = 0; l < TLSPHI_LANES; l++) any |= approaches[l] > 0;
+    return any;
 }
 TLSPHI_INLINE void tlsphi_add_lanes(const int dim, const tlsphi_lane_sums *flux, tlsphi_lane_sums *sum) {
     for (size_t i = 0; i < (size_t)dim * TLSPHI_LANES; i++) sum->T[i] += flux->T[i];
@@ -5429,7 +5435,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         else if (heats && s->M) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 1, sum);
         else if (heats) tlsphi_heat_lanes(&r, a, b, g, dim, s->thermal, 1, 0, sum);
         if (!damps) continue;
-        tlsph_real masked[4 * TLSPHI_LANES_MOST];
+        tlsph_real masked[4 * TLSPHI_LANES];
         if (block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
         tlsphi_lane_sums flux;
         if (s->dissipation == TLSPH_FIRST_ORDER)
@@ -5467,7 +5473,7 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
     const tlsphi_rows r = tlsphi_rows_of(dim, 0, 1, 1, 0);
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, D = (size_t)dim, dd = D * D;
     const tlsph_real *a = tlsphi_at(s, 0, base);
-    tlsph_real sum[9 * TLSPHI_LANES_MOST] = {0};
+    tlsph_real sum[9 * TLSPHI_LANES] = {0};
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
@@ -5504,8 +5510,7 @@ static void tlsphi_adjoint_block(tlsph_solver *s, tlsphi_block *block) {
 static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin, size_t end,
                              int parts, tlsphi_gathered *out) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, D = (size_t)s->dim;
-    tlsphi_lane_sums sum;
-    memset(&sum, 0, sizeof sum);
+    tlsphi_lane_sums sum = {{0}, {0}, {0}, {0}, {0}, {0}, {0}};
     if (s->dim == 3 && s->has_J) tlsphi_flux_slots_31(s, block, tile, base, parts, &sum);
     else if (s->dim == 3) tlsphi_flux_slots_30(s, block, tile, base, parts, &sum);
     else if (s->has_J) tlsphi_flux_slots_21(s, block, tile, base, parts, &sum);
@@ -5519,6 +5524,7 @@ static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, s
         out->heat = sum.heat[l];
         out->source = sum.source[l];
         out->conduction = sum.conduction[l];
+        out->least = TLSPHI_LARGEST;
     }
 }
 
@@ -5601,14 +5607,12 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
 
 static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
     const int first = s->parted ? TLSPHI_STRESSES : TLSPHI_BOTH, passes = s->parted && (!s->frozen || s->damps) ? 2 : 1;
-    tlsphi_gathered part[2][TLSPHI_LANES_MOST]; /* all, or stresses and damping apart */
+    tlsphi_gathered part[2][TLSPHI_LANES]; /* all, or stresses and damping apart */
     for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
     for (size_t begin = block->begin, tile = block->tile, end; begin < block->end; begin = end, tile++) {
         end = tlsphi_tile_end(block, begin);
-        memset(part, 0, sizeof part);
         for (int k = 0; k < passes; k++) {
             const int parts = k ? TLSPHI_DAMPING : first;
-            for (size_t i = 0; i < end - begin; i++) part[k][i].least = TLSPHI_LARGEST;
             if (s->lanes) tlsphi_flux_tile(s, block, tile, begin, end, parts, part[k]);
             else tlsphi_flux_one_by_one(s, begin, end, parts, part[k]);
         }
@@ -6008,7 +6012,7 @@ TLSPHI_INLINE void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
 
 /* Arms X of the particles [begin, end) of a tile, and their volumes, as lanes; 0 where the tile has no particle. */
 typedef struct tlsphi_arms {
-    double X[3][TLSPHI_LANES_MOST], V[TLSPHI_LANES_MOST], f[3][TLSPHI_LANES_MOST];
+    double X[3][TLSPHI_LANES], V[TLSPHI_LANES], f[3][TLSPHI_LANES];
 } tlsphi_arms;
 
 TLSPHI_INLINE void tlsphi_take_arms(const tlsphi_projection *p, const double origin[3], size_t begin, size_t end,
@@ -6033,7 +6037,7 @@ TLSPHI_INLINE void tlsphi_take_arrows(const tlsph_real *f, size_t D, size_t begi
         for (size_t a = begin; a < end; a++) out->f[i][a - base] = (double)f[D * a + i];
 }
 /* Sums of V f, V X x f and, if asked for, V, V X, V X X (6), lane by lane. */
-TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia, double (*m)[TLSPHI_LANES_MOST]) {
+TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia, double (*m)[TLSPHI_LANES]) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         const double V = u->V[l], X[3] = {u->X[0][l], u->X[1][l], u->X[2][l]}, f[3] = {u->f[0][l], u->f[1][l], u->f[2][l]};
         double Xf[3];
@@ -6051,7 +6055,7 @@ TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia,
 /* Moments of a vector field over a block: its lanes are added in order at the end. */
 TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const tlsph_real *field,
                                         const int with_inertia) {
-    double m[TLSPHI_MOMENTS][TLSPHI_LANES_MOST], origin[3];
+    double m[TLSPHI_MOMENTS][TLSPHI_LANES], origin[3];
     tlsphi_arms arms;
     memset(m, 0, sizeof m);
     tlsphi_projection_origin(p, block, origin);
@@ -6330,7 +6334,7 @@ static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
     for (size_t a = s->block[i].begin; a < s->block[i].end; a++) {
         const tlsphi_material *m = tlsphi_material_of(s, a);
         tlsphi_point pt, next;
-        tlsph_real H[9], G[9], gain = 0;
+        tlsph_real H[9], G[9] = {0}, gain = 0;
         tlsphi_load_measures(s, q->first_stage ? &s->old : &s->now, m, a, &pt);
         tlsphi_shrink(s->dim, pt.H, H);
         tlsphi_mirror_all(s, a, H);
@@ -8445,14 +8449,14 @@ typedef struct tlsphi_tiler {
     tlsphi_graph *graph;
     int damped;               /* pairs of the dissipation (TLSPH_CELLS_4) */
     size_t base, begin, end;  /* a - base is the lane */
-    size_t count[TLSPHI_LANES_MOST], most;
+    size_t count[TLSPHI_LANES], most;
     uint32_t *list;           /* lanes x most */
     double *g;                /* lanes x most x D */
     tlsph_real *size, *along; /* lanes x most: |C_ab|, C_ab . d_ab */
     uint8_t *done;            /* lanes x most */
     size_t slot_room, pattern_room, gather_room;
     uint32_t *seen; /* hash table of patterns, number + 1 */
-    tlsph_real pattern[5 * TLSPHI_LANES_MOST];
+    tlsph_real pattern[5 * TLSPHI_LANES];
 } tlsphi_tiler;
 
 /* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
