@@ -945,9 +945,13 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_NONE 0xffffffffu
 #define TLSPHI_LARGEST 1e300 /* stands for "no bound" in reductions */
 #ifdef TLSPH_REAL_FLOAT
+typedef uint32_t tlsphi_bits;
+#define TLSPHI_EXPONENT 0x7f800000u /* its bits */
 #define TLSPHI_EPSILON 1.1920929e-7
 #define TLSPHI_TINY 1.17549435e-38f /* smallest normal number: divisors that may be 0 where the dividend is are no less */
 #else
+typedef uint64_t tlsphi_bits;
+#define TLSPHI_EXPONENT 0x7ff0000000000000u
 #define TLSPHI_EPSILON 2.220446049250313e-16
 #define TLSPHI_TINY 2.2250738585072014e-308
 #endif
@@ -961,15 +965,9 @@ static double tlsphi_dmin(double a, double b) { return a < b ? a : b; }
 
 /* Finite? Asked of the bits, because -ffast-math lets a compiler assume that isfinite is always true. */
 TLSPHI_INLINE int tlsphi_finite(tlsph_real x) {
-#ifdef TLSPH_REAL_FLOAT
-    uint32_t bits;
+    tlsphi_bits bits;
     memcpy(&bits, &x, sizeof bits);
-    return (bits & 0x7f800000u) != 0x7f800000u;
-#else
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return (bits & 0x7ff0000000000000u) != 0x7ff0000000000000u;
-#endif
+    return (bits & TLSPHI_EXPONENT) != TLSPHI_EXPONENT;
 }
 /* x^(-1/3) for positive, normal x to the last digit or two: a third of the exponent, taken from the bits, is right within a
    few percent, and each Newton step 4/3 y - x/3 y^4 doubles the digits (in this form few operations wait for each other, and
@@ -977,13 +975,11 @@ TLSPHI_INLINE int tlsphi_finite(tlsph_real x) {
    registers may cost more than all the rest of a material; and the same on every machine. */
 TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
     tlsph_real y;
+    tlsphi_bits bits;
+    memcpy(&bits, &x, sizeof bits);
 #ifdef TLSPH_REAL_FLOAT
-    uint32_t bits;
-    memcpy(&bits, &x, sizeof bits);
     bits = 0x54a21d2au - bits / 3;
-#else
-    uint64_t bits; /* a third of the upper half, as a product, because vector units do not divide integers */
-    memcpy(&bits, &x, sizeof bits);
+#else /* a third of the upper half, as a product, because vector units do not divide integers */
     bits = (0x553ef0ffu - ((bits >> 32) * 0x55555556u >> 32)) << 32;
 #endif
     memcpy(&y, &bits, sizeof y);
@@ -999,13 +995,11 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
 TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real given) {
     const tlsph_real least = 64 * TLSPHI_TINY, x = given > least ? given : least; /* half of it must not be flushed to 0 */
     tlsph_real y;
-#ifdef TLSPH_REAL_FLOAT
-    uint32_t bits;
+    tlsphi_bits bits;
     memcpy(&bits, &x, sizeof bits);
+#ifdef TLSPH_REAL_FLOAT
     bits = 0x5f375a86u - (bits >> 1);
 #else
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
     bits = 0x5fe6eb50c7b537a9u - (bits >> 1);
 #endif
     memcpy(&y, &bits, sizeof y);
@@ -3493,6 +3487,7 @@ typedef struct tlsphi_rows {
     int lap_p;                        /* D; JST */
     int count;
 } tlsphi_rows;
+enum { TLSPHI_ROWS_MOST = 52 }; /* without those of sharp gradients and JST */
 
 TLSPHI_INLINE tlsphi_rows tlsphi_rows_of(const int dim, const int has_J, int thermal, int conducts, int sharp) {
     tlsphi_rows r;
@@ -3718,8 +3713,11 @@ TLSPHI_INLINE const tlsphi_material *tlsphi_material_of(const tlsph_solver *s, s
 TLSPHI_INLINE tlsph_real *tlsphi_at(const tlsph_solver *s, int row, size_t a) {
     return s->row + (a / TLSPHI_BLOCK * (size_t)s->rows.count + (size_t)row) * TLSPHI_ROW + a % TLSPHI_BLOCK;
 }
+TLSPHI_INLINE void tlsphi_take_apart(const int n, const tlsph_real *at, const size_t apart, tlsph_real *out) {
+    TLSPHI_UNROLL for (int i = 0; i < n; i++) out[i] = at[(size_t)i * apart];
+}
 TLSPHI_INLINE void tlsphi_take_rows(const int n, const tlsph_real *at, tlsph_real *out) {
-    TLSPHI_UNROLL for (int i = 0; i < n; i++) out[i] = at[(size_t)i * TLSPHI_ROW];
+    tlsphi_take_apart(n, at, TLSPHI_ROW, out);
 }
 TLSPHI_INLINE void tlsphi_row_get(const tlsph_solver *s, int row, const int n, size_t a, tlsph_real *out) {
     tlsphi_take_rows(n, tlsphi_at(s, row, a), out);
@@ -5085,28 +5083,29 @@ typedef struct tlsphi_heat_side {
 } tlsphi_heat_side;
 
 /* at: the particle's place in row 0 */
-TLSPHI_INLINE void tlsphi_load_side(const tlsphi_rows *r, const tlsph_real *at, const int dim, const int with_J,
-                                    tlsphi_damp_side *out) {
-    tlsphi_take_rows(dim, at + r->w * TLSPHI_ROW, out->w);
-    tlsphi_take_rows(dim, at + r->X * TLSPHI_ROW, out->X);
-    tlsphi_take_rows(dim * dim, at + r->A * TLSPHI_ROW, out->A);
-    tlsphi_take_rows(dim * dim, at + r->slope_w * TLSPHI_ROW, out->slope_w);
-    out->c_p = at[(r->wave + 0) * TLSPHI_ROW];
-    out->c_s = at[(r->wave + 1) * TLSPHI_ROW];
-    out->rho = at[(r->wave + 2) * TLSPHI_ROW];
-    out->ratio = at[(r->wave + 3) * TLSPHI_ROW];
+TLSPHI_INLINE void tlsphi_load_side(const tlsphi_rows *r, const tlsph_real *at, const size_t apart, const int dim,
+                                    const int with_J, tlsphi_damp_side *out) {
+    tlsphi_take_apart(dim, at + (size_t)r->w * apart, apart, out->w);
+    tlsphi_take_apart(dim, at + (size_t)r->X * apart, apart, out->X);
+    tlsphi_take_apart(dim * dim, at + (size_t)r->A * apart, apart, out->A);
+    tlsphi_take_apart(dim * dim, at + (size_t)r->slope_w * apart, apart, out->slope_w);
+    out->c_p = at[(size_t)(r->wave + 0) * apart];
+    out->c_s = at[(size_t)(r->wave + 1) * apart];
+    out->rho = at[(size_t)(r->wave + 2) * apart];
+    out->ratio = at[(size_t)(r->wave + 3) * apart];
     out->S = 0;
     if (!with_J) return;
-    out->S = at[r->S * TLSPHI_ROW];
-    tlsphi_take_rows(dim, at + r->slope_S * TLSPHI_ROW, out->slope_S);
+    out->S = at[(size_t)r->S * apart];
+    tlsphi_take_apart(dim, at + (size_t)r->slope_S * apart, apart, out->slope_S);
 }
-TLSPHI_INLINE void tlsphi_load_heat(const tlsphi_rows *r, const tlsph_real *at, const int dim, tlsphi_heat_side *out) {
-    tlsphi_take_rows(dim, at + r->X * TLSPHI_ROW, out->X);
-    tlsphi_take_rows(dim * dim, at + r->A * TLSPHI_ROW, out->A);
-    tlsphi_take_rows(dim, at + r->slope_theta * TLSPHI_ROW, out->slope);
-    tlsphi_take_rows(dim, at + r->heat * TLSPHI_ROW, out->heat);
-    out->theta = at[r->theta * TLSPHI_ROW];
-    out->h_J = at[r->h_J * TLSPHI_ROW];
+TLSPHI_INLINE void tlsphi_load_heat(const tlsphi_rows *r, const tlsph_real *at, const size_t apart, const int dim,
+                                    tlsphi_heat_side *out) {
+    tlsphi_take_apart(dim, at + (size_t)r->X * apart, apart, out->X);
+    tlsphi_take_apart(dim * dim, at + (size_t)r->A * apart, apart, out->A);
+    tlsphi_take_apart(dim, at + (size_t)r->slope_theta * apart, apart, out->slope);
+    tlsphi_take_apart(dim, at + (size_t)r->heat * apart, apart, out->heat);
+    out->theta = at[(size_t)r->theta * apart];
+    out->h_J = at[(size_t)r->h_J * apart];
 }
 
 /* What a pair dissipates: the fluxes, their production, and whether it might be a front. */
@@ -5277,8 +5276,8 @@ TLSPHI_INLINE void tlsphi_add_stress(const tlsph_solver *s, size_t a, size_t k, 
     if (!s->heat_moves) return;
     tlsphi_heat_side side_a, side_b;
     tlsphi_pair_of_heat heat;
-    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), dim, &side_a);
-    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), dim, &side_b);
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, &side_a);
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), TLSPHI_ROW, dim, &side_b);
     tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
                      s->thermal, s->conduction == TLSPH_COMPACT, &heat);
     sum->heat += heat.heat;
@@ -5293,8 +5292,8 @@ TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t
     tlsph_real heat = 0, c[3];
     memset(&flux, 0, sizeof flux);
     if (s->dissipation != TLSPH_JST || s->audit) {
-        tlsphi_load_side(&s->rows, tlsphi_at(s, 0, a), dim, s->has_J, &side_a);
-        tlsphi_load_side(&s->rows, tlsphi_at(s, 0, b), dim, s->has_J, &side_b);
+        tlsphi_load_side(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, s->has_J, &side_a);
+        tlsphi_load_side(&s->rows, tlsphi_at(s, 0, b), TLSPHI_ROW, dim, s->has_J, &side_b);
     }
     if (s->dissipation == TLSPH_AS_PRINTED) {
         tlsphi_multiply_mean(dim, side_a.A, side_b.A, g, c);
@@ -5349,11 +5348,17 @@ typedef struct tlsphi_lane_sums {
     tlsph_real heat[TLSPHI_LANES], source[TLSPHI_LANES], conduction[TLSPHI_LANES];
 } tlsphi_lane_sums;
 
+/* The rows [first, end) of the tile itself, close together: that saves an address a row, which a compiler would keep, and
+   load for every pair. */
+TLSPHI_INLINE void tlsphi_take_tile(const tlsph_real *row, int first, int end, tlsph_real *out) {
+    for (size_t i = (size_t)first; i < (size_t)end; i++)
+        memcpy(out + i * TLSPHI_LANES, row + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *out);
+}
 TLSPHI_INLINE void tlsphi_stress_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
                                        const tlsph_real *pattern, const int dim, tlsphi_lane_sums *sum) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsph_real P_a[9], P_b[9], g[3], t[3];
-        tlsphi_take_rows(dim * dim, a + r->P * TLSPHI_ROW + l, P_a);
+        tlsphi_take_apart(dim * dim, a + r->P * TLSPHI_LANES + l, TLSPHI_LANES, P_a);
         tlsphi_take_rows(dim * dim, b + r->P * TLSPHI_ROW + l, P_b);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
         tlsphi_multiply_mean(dim, P_a, P_b, g, t);
@@ -5367,8 +5372,8 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
         tlsphi_heat_side side_a, side_b;
         tlsphi_pair_of_heat heat;
         tlsph_real g[3];
-        tlsphi_load_heat(r, a + l, dim, &side_a);
-        tlsphi_load_heat(r, b + l, dim, &side_b);
+        tlsphi_load_heat(r, a + l, TLSPHI_LANES, dim, &side_a);
+        tlsphi_load_heat(r, b + l, TLSPHI_ROW, dim, &side_b);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
         const tlsph_real C = pattern[(size_t)dim * TLSPHI_LANES + l];
         const tlsph_real along = given ? pattern[(size_t)(dim + 1) * TLSPHI_LANES + l] : tlsphi_along(&side_a, &side_b, g, dim);
@@ -5382,24 +5387,22 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
 TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
                                     const tlsph_real *pattern, const int dim, const int with_J, const int kind,
                                     const int with_front, tlsph_real jump_share, tlsphi_lane_sums *out) {
-    tlsph_real approaches[TLSPHI_LANES];
-    int any = 0;
+    tlsphi_bits any = 0; /* of the width of a lane, so that lanes can be joined */
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_damp_side side_a, side_b;
         tlsphi_damping flux;
         tlsph_real g[3];
-        tlsphi_load_side(r, a + l, dim, with_J, &side_a);
-        tlsphi_load_side(r, b + l, dim, with_J, &side_b);
+        tlsphi_load_side(r, a + l, TLSPHI_LANES, dim, with_J, &side_a);
+        tlsphi_load_side(r, b + l, TLSPHI_ROW, dim, with_J, &side_b);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
         tlsphi_pair_dissipate(&side_a, &side_b, g, pattern[(size_t)dim * TLSPHI_LANES + l], dim, with_J, with_front,
                               kind, 0, jump_share, &flux);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) out->T[(size_t)i * TLSPHI_LANES + l] = flux.D_p[i];
         out->J[l] = flux.D_J;
         out->production[l] = flux.production;
-        approaches[l] = flux.approaches;
+        any |= flux.approaches > 0 ? 1u : 0u;
     }
-    for (size_t l = 0; l < TLSPHI_LANES; l++) any |= approaches[l] > 0;
-    return any;
+    return any != 0;
 }
 TLSPHI_INLINE void tlsphi_add_lanes(const int dim, const tlsphi_lane_sums *flux, tlsphi_lane_sums *sum) {
     for (size_t i = 0; i < (size_t)dim * TLSPHI_LANES; i++) sum->T[i] += flux->T[i];
@@ -5423,9 +5426,10 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
                                      const int dim, const int with_J, int parts, tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
-    const tlsph_real *a = tlsphi_at(s, 0, base);
+    tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
     const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
     const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
+    tlsphi_take_tile(tlsphi_at(s, 0, base), r.w, rows, a);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
@@ -5472,8 +5476,8 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
     const tlsphi_graph *graph = &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, 0, 1, 1, 0);
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, D = (size_t)dim, dd = D * D;
-    const tlsph_real *a = tlsphi_at(s, 0, base);
-    tlsph_real sum[9 * TLSPHI_LANES] = {0};
+    tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES], sum[9 * TLSPHI_LANES] = {0};
+    tlsphi_take_tile(tlsphi_at(s, 0, base), r.w, r.S, a);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
@@ -5482,7 +5486,7 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
         if (slot->scattered) tlsphi_gather(s, block, graph, slot, r.A, r.S);
         tlsphi_damp_lanes(&r, a, b, g, dim, 0, TLSPH_SELF_ADJOINT, 0, 0, &flux);
         for (size_t j = 0; j < D; j++) {
-            const tlsph_real *X_a = a + ((size_t)r.X + j) * TLSPHI_ROW, *X_b = b + ((size_t)r.X + j) * TLSPHI_ROW;
+            const tlsph_real *X_a = a + ((size_t)r.X + j) * TLSPHI_LANES, *X_b = b + ((size_t)r.X + j) * TLSPHI_ROW;
             for (size_t i = 0; i < D; i++)
                 for (size_t l = 0; l < TLSPHI_LANES; l++)
                     sum[(D * i + j) * TLSPHI_LANES + l] -= flux.T[i * TLSPHI_LANES + l] * (X_b[l] - X_a[l]);
@@ -6720,7 +6724,7 @@ TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
     tlsphi_heat_side side_a, side_b;
     tlsphi_pair_of_heat sum, heat;
     memset(&sum, 0, sizeof sum);
-    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), dim, &side_a);
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, &side_a);
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
         const tlsph_real *g = s->g + D * k, *C = g;
@@ -6730,7 +6734,7 @@ TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
             tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
             C = skew;
         }
-        tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), dim, &side_b);
+        tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), TLSPHI_ROW, dim, &side_b);
         tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
                          TLSPH_ENERGY, s->conduction == TLSPH_COMPACT, &heat);
         sum.heat += heat.heat;
@@ -7999,11 +8003,6 @@ static double tlsphi_get_double(const unsigned char **at) {
     memcpy(&x, &bits, sizeof x);
     return x;
 }
-#ifdef TLSPH_REAL_FLOAT
-typedef uint32_t tlsphi_bits;
-#else
-typedef uint64_t tlsphi_bits;
-#endif
 static void tlsphi_put_real(unsigned char **at, tlsph_real x) {
     tlsphi_bits bits;
     memcpy(&bits, &x, sizeof bits);
