@@ -6019,26 +6019,38 @@ typedef struct tlsphi_arms {
     double X[3][TLSPHI_LANES], V[TLSPHI_LANES], f[3][TLSPHI_LANES];
 } tlsphi_arms;
 
-TLSPHI_INLINE void tlsphi_take_arms(const tlsphi_projection *p, const double origin[3], size_t begin, size_t end,
-                                    tlsphi_arms *out) {
-    const tlsph_solver *s = p->s;
-    const size_t D = (size_t)s->dim, base = begin / TLSPHI_LANES * TLSPHI_LANES;
-    const tlsph_real *x = s->linear ? s->X : s->now.x;
-    memset(out, 0, sizeof *out);
-    for (size_t a = begin; a < end; a++) out->V[a - base] = (double)s->V[a];
-    for (size_t i = 0; i < D; i++) {
-        if (s->linear || !p->stage.ahead)
-            for (size_t a = begin; a < end; a++) out->X[i][a - base] = (double)x[D * a + i] - origin[i];
-        else
-            for (size_t a = begin; a < end; a++)
-                out->X[i][a - base] = tlsphi_next_position(s, &p->stage, p->dt, D * a + i) - origin[i];
-    }
+TLSPHI_INLINE void tlsphi_take_vectors_of(const tlsph_real *f, const size_t D, size_t begin, size_t end,
+                                          double (*out)[TLSPHI_LANES]) {
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
+    if (end - begin == TLSPHI_LANES)
+        for (size_t l = 0; l < TLSPHI_LANES; l++)
+            TLSPHI_UNROLL for (size_t i = 0; i < D; i++) out[i][l] = (double)f[D * (base + l) + i];
+    else
+        for (size_t a = begin; a < end; a++)
+            for (size_t i = 0; i < D; i++) out[i][a - base] = (double)f[D * a + i];
 }
 /* A vector field of the same particles. */
-TLSPHI_INLINE void tlsphi_take_arrows(const tlsph_real *f, size_t D, size_t begin, size_t end, tlsphi_arms *out) {
+static void tlsphi_take_vectors(const tlsph_real *f, int dim, size_t begin, size_t end, double (*out)[TLSPHI_LANES]) {
+    if (dim == 3) tlsphi_take_vectors_of(f, 3, begin, end, out);
+    else tlsphi_take_vectors_of(f, 2, begin, end, out);
+}
+static void tlsphi_take_arms(const tlsphi_projection *p, const double origin[3], size_t begin, size_t end,
+                             tlsphi_arms *out) {
+    const tlsph_solver *s = p->s;
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
-    for (size_t i = 0; i < D; i++)
-        for (size_t a = begin; a < end; a++) out->f[i][a - base] = (double)f[D * a + i];
+    const double B = p->stage.b, C = p->stage.c * p->dt;
+    const int ahead = p->stage.ahead && !s->linear;
+    double was[3][TLSPHI_LANES] = {{0}}, v[3][TLSPHI_LANES] = {{0}};
+    memset(out, 0, sizeof *out);
+    for (size_t a = begin; a < end; a++) out->V[a - base] = (double)s->V[a];
+    tlsphi_take_vectors(s->linear ? s->X : s->now.x, s->dim, begin, end, out->X);
+    if (ahead) tlsphi_take_vectors(s->old.x, s->dim, begin, end, was);
+    if (ahead) tlsphi_take_vectors(s->v, s->dim, begin, end, v);
+    for (int i = 0; i < s->dim; i++) {
+        for (size_t l = 0; ahead && l < TLSPHI_LANES; l++) /* as tlsphi_next_position */
+            out->X[i][l] = was[i][l] + B * (out->X[i][l] - was[i][l]) + C * v[i][l];
+        for (size_t l = 0; l < TLSPHI_LANES; l++) out->X[i][l] -= origin[i];
+    }
 }
 /* Sums of V f, V X x f and, if asked for, V, V X, V X X (6), lane by lane. */
 TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia, double (*m)[TLSPHI_LANES]) {
@@ -6066,7 +6078,7 @@ TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block
     for (size_t begin = block->begin, end; begin < block->end; begin = end) {
         end = tlsphi_tile_end(block, begin);
         tlsphi_take_arms(p, origin, begin, end, &arms);
-        tlsphi_take_arrows(field, (size_t)p->s->dim, begin, end, &arms);
+        tlsphi_take_vectors(field, p->s->dim, begin, end, arms.f);
         tlsphi_add_arms(&arms, with_inertia, m);
     }
     for (int k = 0; k < TLSPHI_MOMENTS; k++) {
