@@ -3583,6 +3583,7 @@ typedef struct tlsphi_body {
     int turns;                            /* axes about which its mirror planes let it turn: 3, 1 (`axis`) or 0 */
     double axis[3];
     double v_mean[3], spin[3];            /* rigid motion nearest to v */
+    double turn[3];                       /* the spin that grad w lacks */
     double lambda[3], linear[3];          /* multipliers of the projection */
     int closed;                           /* incompressible: its whole surface is held, so that the mean pressure is free */
     double shift;
@@ -3629,6 +3630,7 @@ struct tlsph_solver {
     tlsphi_super super;
     int audit, projection, dissipation_heats, retries, threads, bonds;
     int gathers_w;     /* grad w is a sum over neighbours; else it comes from that of v, see tlsphi_take_turn */
+    int keeps_rate;    /* rate_F is there */
     int keeps_pairs;   /* `neighbour` and `g` are there; else only the graph of [TILES] */
     int turns;         /* the body's spin turns F exactly (tlsphi_turn_gradient) */
     int frozen, damps; /* the integrator freezes the dissipation; this stage evaluates it */
@@ -3673,7 +3675,7 @@ struct tlsph_solver {
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
     tlsphi_rows rows;
     tlsph_real *row;         /* blocks of rows, see above */
-    tlsph_real *v, *grad_v;  /* velocity; grad v, which is rate_F but for sharp gradients */
+    tlsph_real *v, *grad_v;  /* velocity; grad v, which is rate_F but for sharp gradients. Both NULL: see tlsphi_take_turn */
     int lanes;               /* fluxes by lanes, see [FLUXES] */
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
@@ -4667,7 +4669,8 @@ TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, siz
 }
 /* w = v - spin x (x - centre) - mean, to its rows, and grad w = grad v - spin x F in place of G = grad v. As F is the
    gradient of x this saves a gather; it sees x and F of the stage, which is as exact for rigid and affine motions, but
-   where forces take torques about x_next it is not their adjoint to the last digit: scenes with E or eta gather grad w. */
+   where forces take torques about x_next it is not their adjoint to the last digit: scenes with E or eta gather grad w.
+   Grad v follows from grad w and F in the same manner, so that Runge-Kutta schemes need no array for it here. */
 TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *body, size_t base, size_t first,
                                     size_t last, const int dim, tlsph_real *G) {
     const size_t D = (size_t)dim, dd = D * D;
@@ -4738,7 +4741,7 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     }
     tlsphi_finish_gradients(scale, M, dim, dim, sum->v);
     if (with_w) tlsphi_finish_gradients(scale, M, dim, dim, sum->w);
-    tlsphi_store_lanes(dd, sum->v, first, last, TLSPHI_LANES, s->grad_v + (size_t)dd * base);
+    if (s->grad_v) tlsphi_store_lanes(dd, sum->v, first, last, TLSPHI_LANES, s->grad_v + (size_t)dd * base);
     if (s->projection && !s->gathers_w) tlsphi_take_turn(s, s->body + block->body, base, first, last, dim, w);
     tlsphi_store_rows(dd, w, first, last, row + (size_t)s->rows.grad_w * TLSPHI_ROW);
     if (with_S) {
@@ -4811,9 +4814,11 @@ static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     const tlsphi_rows *r = &s->rows;
     tlsph_real Gw[9], slope[3];
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
-        tlsphi_tensor_get(s->grad_v, dd, a, Gw);
-        tlsphi_mirror_tensor(dim, m, Gw);
-        tlsphi_tensor_put(s->grad_v, dd, a, Gw);
+        if (s->grad_v) {
+            tlsphi_tensor_get(s->grad_v, dd, a, Gw);
+            tlsphi_mirror_tensor(dim, m, Gw);
+            tlsphi_tensor_put(s->grad_v, dd, a, Gw);
+        }
         tlsphi_row_get(s, r->grad_w, dd, a, Gw);
         tlsphi_mirror_tensor(dim, m, Gw);
         tlsphi_row_put(s, r->grad_w, dd, a, Gw);
@@ -4845,14 +4850,34 @@ static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
     tlsphi_row_put(s, s->rows.heat, dim, a, s->M ? heat : Q);
 }
 
+/* G += spin x F */
+static void tlsphi_add_turn(const tlsph_solver *s, const double spin[3], size_t a, tlsph_real *G) {
+    const size_t D = (size_t)s->dim;
+    tlsph_real F[9];
+    tlsphi_tensor_get(s->now.F, s->dim * s->dim, a, F);
+    for (size_t j = 0; j < D; j++) {
+        double column[3] = {0, 0, 0}, turn[3];
+        for (size_t i = 0; i < D; i++) column[i] = (double)F[D * i + j];
+        tlsphi_cross3(spin, column, turn);
+        for (size_t i = 0; i < D; i++) G[D * i + j] += (tlsph_real)turn[i];
+    }
+}
+/* grad v of a particle of the body: kept, or grad w + turn x F. */
+static void tlsphi_velocity_gradient(const tlsph_solver *s, const tlsphi_body *body, size_t a, tlsph_real *G) {
+    if (s->rate_F) tlsphi_tensor_get(s->rate_F, s->dim * s->dim, a, G);
+    else {
+        tlsphi_row_get(s, s->rows.grad_w, s->dim * s->dim, a, G);
+        if (s->projection) tlsphi_add_turn(s, body->turn, a, G);
+    }
+}
 /* dJ/dt = H : grad v where grad v is not the raw sum's; the dissipation is added by the fluxes. */
-static void tlsphi_jacobian_rate(tlsph_solver *s, size_t a) {
+static void tlsphi_jacobian_rate(tlsph_solver *s, const tlsphi_body *body, size_t a) {
     const int dd = s->dim * s->dim;
     tlsphi_point pt;
     tlsph_real H[9], G[9] = {0};
     tlsphi_load_measures(s, &s->now, tlsphi_material_of(s, a), a, &pt);
     tlsphi_shrink(s->dim, pt.H, H);
-    tlsphi_tensor_get(s->rate_F, dd, a, G);
+    tlsphi_velocity_gradient(s, body, a, G);
     s->rate_J[a] = tlsphi_dot(dd, H, G);
 }
 
@@ -4894,17 +4919,10 @@ static const tlsphi_image *tlsphi_find_image(const tlsph_solver *s, size_t a) {
 /* dF/dt = grad w + spin x F: exact for turns where grad x is F only to the slack of TLSPH_CLOSED. P does no work on the
    second part. */
 static void tlsphi_turn_gradient(tlsph_solver *s, const double spin[3], size_t a) {
-    const size_t D = (size_t)s->dim, dd = D * D;
-    tlsph_real F[9], G[9];
-    tlsphi_row_get(s, s->rows.grad_w, (int)dd, a, G);
-    tlsphi_tensor_get(s->now.F, (int)dd, a, F);
-    for (size_t j = 0; j < D; j++) {
-        double column[3] = {0, 0, 0}, turn[3];
-        for (size_t i = 0; i < D; i++) column[i] = (double)F[D * i + j];
-        tlsphi_cross3(spin, column, turn);
-        for (size_t i = 0; i < D; i++) G[D * i + j] += (tlsph_real)turn[i];
-    }
-    tlsphi_tensor_put(s->rate_F, (int)dd, a, G);
+    tlsph_real G[9];
+    tlsphi_row_get(s, s->rows.grad_w, s->dim * s->dim, a, G);
+    tlsphi_add_turn(s, spin, a, G);
+    tlsphi_tensor_put(s->rate_F, s->dim * s->dim, a, G);
 }
 static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     const int with_S = s->has_J && s->damps, with_theta = s->heat_moves;
@@ -4927,7 +4945,8 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
         if (held != from) tlsphi_hold_gradient(s, from, held);
         if (mirrored) tlsphi_mirror_gradients(s, a);
         if (s->turns) tlsphi_turn_gradient(s, s->body[block->body].spin, a);
-        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || held != from || s->turns)) tlsphi_jacobian_rate(s, a);
+        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || held != from || s->turns))
+            tlsphi_jacobian_rate(s, s->body + block->body, a);
         if (with_theta && (s->rest || mirrored)) tlsphi_heat_flux(s, a); /* their gradients are not the raw sums */
     }
 }
@@ -4994,7 +5013,7 @@ TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int 
     }
     tlsphi_row_put(s, s->rows.slope_w, (int)dd, a, slope);
     tlsphi_row_put(s, s->rows.P, (int)dd, a, P);
-    if (s->rate_J) tlsphi_jacobian_rate(s, a);
+    if (s->rate_J) tlsphi_jacobian_rate(s, NULL, a);
 }
 static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
     for (size_t a = block->begin; a < block->end; a++) {
@@ -6245,6 +6264,7 @@ static void tlsphi_find_moments(tlsphi_projection *p) {
 }
 static void tlsphi_find_rigid_motion(tlsphi_projection *p) {
     tlsphi_find_moments(p);
+    for (size_t i = 0; i < p->s->bodies; i++) memcpy(p->s->body[i].turn, p->s->body[i].spin, sizeof p->s->body[i].turn);
     if (p->s->gathers_w) tlsphi_run_tasks(p->s, tlsphi_relative_task, p);
 }
 static void tlsphi_project_forces(tlsphi_projection *p, void (*solve)(tlsphi_body *body, const double *moments)) {
@@ -6891,36 +6911,6 @@ static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double d
    sum over the body is -sum (w.T_D + Sigma_J D_J) as before, so that the energy is conserved to round-off. Given up: within
    a step w may turn against T_D, so that a share, and the production of a pair, may be negative by O(dt) of itself. */
 
-/* dH/dt = F x grad v with F of state u, for the lanes [first, last) of the tile at `base`. */
-TLSPHI_INLINE void tlsphi_cofactor_lanes(tlsph_solver *s, const tlsphi_state *u, size_t base, size_t first, size_t last,
-                                         const int dim, tlsph_real B, tlsph_real C) {
-    const size_t dd = (size_t)(dim * dim), at = dd * base;
-    const tlsph_real *u_F = u->F + at, *u_H = u->H + at, *rate_F = s->rate_F + at, *old = s->old.H + at;
-    tlsph_real *now = s->now.H + at;
-    TLSPHI_EACH_LANE for (size_t l = first; l < last; l++) {
-        tlsph_real in[9], G_in[9], F[9], G[9], rate[9], out[9];
-        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) in[i] = u_F[i * TLSPHI_LANES + l];
-        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) G_in[i] = rate_F[i * TLSPHI_LANES + l];
-        tlsphi_expand(dim, in, 1, F);
-        tlsphi_expand(dim, G_in, 0, G);
-        tlsphi_cross_inline(F, G, rate);
-        tlsphi_shrink(dim, rate, out);
-        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) {
-            const size_t k = i * TLSPHI_LANES + l;
-            now[k] = old[k] + B * (u_H[k] - old[k]) + C * out[i];
-        }
-    }
-}
-static void tlsphi_update_cofactors(tlsph_solver *s, const tlsphi_state *u, const tlsphi_block *block, tlsph_real B,
-                                    tlsph_real C) {
-    for (size_t a = block->begin, end; a < block->end; a = end) {
-        const size_t first = a % TLSPHI_LANES, base = a - first;
-        end = tlsphi_tile_end(block, a);
-        if (s->dim == 2) tlsphi_cofactor_lanes(s, u, base, first, end - base, 2, B, C);
-        else if (end - a == TLSPHI_LANES) tlsphi_cofactor_lanes(s, u, base, 0, TLSPHI_LANES, 3, B, C);
-        else tlsphi_cofactor_lanes(s, u, base, first, end - base, 3, B, C);
-    }
-}
 /* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
 static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
     const size_t D = (size_t)s->dim;
@@ -6931,18 +6921,58 @@ static void tlsphi_combine(tlsph_real *now, const tlsph_real *old, const tlsph_r
                            size_t begin, size_t end, tlsph_real B, tlsph_real C) {
     for (size_t i = begin; i < end; i++) now[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
 }
-/* The same for F of the particles [begin, end): whole tiles at once, of others the lanes that belong to them. */
-static void tlsphi_combine_gradients(tlsph_solver *s, const tlsphi_state *u, size_t begin, size_t end, tlsph_real B,
-                                     tlsph_real C) {
-    const size_t dd = (size_t)(s->dim * s->dim), whole = end / TLSPHI_LANES * TLSPHI_LANES;
-    for (size_t a = begin, next; a < end; a = next) {
-        const int aligned = a % TLSPHI_LANES == 0 && a < whole;
-        next = aligned ? whole : a / TLSPHI_LANES == end / TLSPHI_LANES ? end : (a / TLSPHI_LANES + 1) * TLSPHI_LANES;
-        if (aligned) tlsphi_combine(s->now.F, s->old.F, u->F, s->rate_F, dd * a, dd * next, B, C);
-        for (size_t i = 0; !aligned && i < dd; i++) {
-            const size_t at = tlsphi_tensor_at(dd, a) + i * TLSPHI_LANES;
-            tlsphi_combine(s->now.F, s->old.F, u->F, s->rate_F, at, at + (next - a), B, C);
+/* The same for F and, where it is evolved, H, of the lanes [first, last) of the tile at `base`: dF/dt = grad v and
+   dH/dt = F x grad v with F of state u. `from` and `turn`: grad v, or grad w and the spin that it lacks. */
+TLSPHI_INLINE void tlsphi_deform_lanes(tlsph_solver *s, const tlsphi_state *u, const tlsph_real *from, size_t apart,
+                                       const tlsph_real turn[3], size_t base, size_t first, size_t last, const int dim,
+                                       const int has_H, tlsph_real B, tlsph_real C) {
+    const size_t D = (size_t)dim, dd = D * D, at = dd * base;
+    const tlsph_real *u_F = u->F + at, *u_H = u->H + (has_H ? at : 0), *old_F = s->old.F + at, *old_H = s->old.H + (has_H ? at : 0);
+    tlsph_real *now_F = s->now.F + at, *now_H = s->now.H + (has_H ? at : 0);
+    TLSPHI_EACH_LANE for (size_t l = first; l < last; l++) {
+        tlsph_real u_in[9], G_in[9], F[9], G[9], rate[9], out[9];
+        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) u_in[i] = u_F[i * TLSPHI_LANES + l];
+        TLSPHI_UNROLL for (size_t j = 0; j < D; j++) {
+            const tlsph_real c[3] = {u_in[j], u_in[D + j], dim == 3 ? u_in[2 * D + j] : 0};
+            G_in[j] = from[j * apart + l] + turn[1] * c[2] - turn[2] * c[1];
+            G_in[D + j] = from[(D + j) * apart + l] + turn[2] * c[0] - turn[0] * c[2];
+            if (dim == 3) G_in[2 * D + j] = from[(2 * D + j) * apart + l] + turn[0] * c[1] - turn[1] * c[0];
         }
+        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) {
+            const size_t k = i * TLSPHI_LANES + l;
+            now_F[k] = old_F[k] + B * (u_in[i] - old_F[k]) + C * G_in[i];
+        }
+        if (!has_H) continue;
+        tlsphi_expand(dim, u_in, 1, F);
+        tlsphi_expand(dim, G_in, 0, G);
+        tlsphi_cross_inline(F, G, rate);
+        tlsphi_shrink(dim, rate, out);
+        TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) {
+            const size_t k = i * TLSPHI_LANES + l;
+            now_H[k] = old_H[k] + B * (u_H[k] - old_H[k]) + C * out[i];
+        }
+    }
+}
+TLSPHI_INLINE void tlsphi_deform_tile(tlsph_solver *s, const tlsphi_state *u, const tlsph_real *from, size_t apart,
+                                      const tlsph_real turn[3], size_t a, size_t end, const int dim, tlsph_real B,
+                                      tlsph_real C) {
+    const size_t first = a % TLSPHI_LANES, base = a - first, last = end - base;
+    const int whole = end - a == TLSPHI_LANES;
+    if (whole && s->has_H) tlsphi_deform_lanes(s, u, from, apart, turn, base, 0, TLSPHI_LANES, dim, 1, B, C);
+    else if (whole) tlsphi_deform_lanes(s, u, from, apart, turn, base, 0, TLSPHI_LANES, dim, 0, B, C);
+    else if (s->has_H) tlsphi_deform_lanes(s, u, from, apart, turn, base, first, last, dim, 1, B, C);
+    else tlsphi_deform_lanes(s, u, from, apart, turn, base, first, last, dim, 0, B, C);
+}
+static void tlsphi_deform(tlsph_solver *s, const tlsphi_state *u, const tlsphi_block *block, tlsph_real B, tlsph_real C) {
+    const size_t dd = (size_t)(s->dim * s->dim);
+    tlsph_real turn[3] = {0, 0, 0};
+    for (int i = 0; i < 3 && !s->rate_F && s->projection; i++) turn[i] = (tlsph_real)s->body[block->body].turn[i];
+    for (size_t a = block->begin, end; a < block->end; a = end) {
+        const size_t base = a / TLSPHI_LANES * TLSPHI_LANES, apart = s->rate_F ? TLSPHI_LANES : TLSPHI_ROW;
+        const tlsph_real *from = s->rate_F ? s->rate_F + dd * base : tlsphi_at(s, s->rows.grad_w, base);
+        end = tlsphi_tile_end(block, a);
+        if (s->dim == 3) tlsphi_deform_tile(s, u, from, apart, turn, a, end, 3, B, C);
+        else tlsphi_deform_tile(s, u, from, apart, turn, a, end, 2, B, C);
     }
 }
 typedef struct tlsphi_update {
@@ -6957,11 +6987,10 @@ static void tlsphi_update_task(void *arg, size_t i) {
     const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real B = up->B, C = up->C;
     const tlsphi_state *u = up->u;
-    if (s->has_H) tlsphi_update_cofactors(s, u, s->block + i, B, C);
     for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
     tlsphi_combine(s->now.x, s->old.x, u->x, s->v, D * begin, D * end, B, C);
     tlsphi_combine(s->now.p, s->old.p, u->p, s->rate_p, D * begin, D * end, B, C);
-    tlsphi_combine_gradients(s, u, begin, end, B, C);
+    tlsphi_deform(s, u, s->block + i, B, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, u->J, s->rate_J, begin, end, B, C);
     if (s->now.E) tlsphi_combine(s->now.E, s->old.E, u->E, s->rate_E, begin, end, B, C);
 }
@@ -7160,9 +7189,8 @@ static void tlsphi_drift_task(void *arg, size_t i) {
     tlsph_solver *s = drift->s;
     const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
-    if (s->has_H) tlsphi_update_cofactors(s, &s->now, s->block + i, 0, C);
     tlsphi_combine(s->now.x, s->old.x, s->now.x, s->v, D * begin, D * end, 0, C);
-    tlsphi_combine_gradients(s, &s->now, begin, end, 0, C);
+    tlsphi_deform(s, &s->now, s->block + i, 0, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, on, C);
     if (s->thermal == TLSPH_ENERGY || (s->thermal && drift->on))
         tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, on, C);
@@ -7816,11 +7844,17 @@ static void tlsphi_out_vector(int dim, const tlsph_real *v, tlsph_real scale, tl
     for (int i = 0; i < dim; i++) out[i] = v[i] * scale;
 }
 
+static const tlsphi_body *tlsphi_body_of(const tlsph_solver *s, size_t a) {
+    size_t i = s->bodies - 1;
+    while (s->body[i].first > a) i--;
+    return s->body + i;
+}
 /* Fields that are stored. Returns 0 if `field` is none of them. */
 static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field, tlsph_real *out) {
     const int dim = s->dim;
     const size_t D = (size_t)dim;
     const tlsph_real rho = tlsphi_material_of(s, a)->rho;
+    tlsph_real G[9];
     switch (field) {
     case TLSPH_FIELD_REFERENCE_POSITION: tlsphi_out_vector(dim, s->X + D * a, 1, out); return 1;
     case TLSPH_FIELD_POSITION: tlsphi_out_vector(dim, s->now.x + D * a, 1, out); return 1;
@@ -7832,7 +7866,10 @@ static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field
     case TLSPH_FIELD_MOMENTUM: tlsphi_out_vector(dim, s->now.p + D * a, 1, out); return 1;
     case TLSPH_FIELD_BOUNDARY_AREA: tlsphi_out_vector(dim, s->B + D * a, 1, out); return 1;
     case TLSPH_FIELD_F: tlsphi_tensor_expand(s->now.F, dim, a, 1, out); return 1;
-    case TLSPH_FIELD_VELOCITY_GRADIENT: tlsphi_tensor_expand(s->rate_F, dim, a, 0, out); return 1;
+    case TLSPH_FIELD_VELOCITY_GRADIENT:
+        tlsphi_velocity_gradient(s, tlsphi_body_of(s, a), a, G);
+        tlsphi_expand(dim, G, 0, out);
+        return 1;
     case TLSPH_FIELD_VOLUME: *out = s->V[a]; return 1;
     case TLSPH_FIELD_MASS: *out = s->V[a] * rho; return 1;
     case TLSPH_FIELD_NEIGHBOURS: *out = (tlsph_real)(s->first[a + 1] - s->first[a]); return 1;
@@ -8822,6 +8859,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->turns = d->projection && d->operator_kind == TLSPH_CLOSED && !s->linear && !s->sharp && !s->incompressible;
     s->gathers_w = s->projection && (s->thermal || s->turns || s->frozen || s->bonds || s->sharp || s->incompressible ||
                                      s->rates.levels > 1); /* F is not that of the pass */
+    s->keeps_rate = s->gathers_w || s->linear || s->sharp || s->leaps || s->bonds || s->images || tlsphi_has_moments(d);
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
         s->rows.lap_p = s->rows.count;
@@ -8873,7 +8911,7 @@ static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
 static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     const size_t D = (size_t)s->dim, n = s->n;
     s->rate_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
-    s->rate_F = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D));
+    if (s->keeps_rate) s->rate_F = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D));
     s->v = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D)) : s->rate_F;
