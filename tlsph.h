@@ -8859,7 +8859,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->turns = d->projection && d->operator_kind == TLSPH_CLOSED && !s->linear && !s->sharp && !s->incompressible;
     s->gathers_w = s->projection && (s->thermal || s->turns || s->frozen || s->bonds || s->sharp || s->incompressible ||
                                      s->rates.levels > 1); /* F is not that of the pass */
-    s->keeps_rate = s->gathers_w || s->linear || s->sharp || s->leaps || s->bonds || s->images || tlsphi_has_moments(d);
+    s->keeps_rate = s->gathers_w || s->linear || s->sharp || s->leaps || s->bonds || s->images || s->incompressible ||
+                    s->rates.levels > 1 || tlsphi_has_moments(d);
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
         s->rows.lap_p = s->rows.count;
