@@ -4610,6 +4610,11 @@ TLSPHI_INLINE void tlsphi_gradient_rows(const tlsph_real *a, const tlsph_real *b
     }
 }
 
+/* Sums of a tile start from 0; in this form, because for memset compilers call what takes longer than the stores. */
+TLSPHI_INLINE void tlsphi_clear_lanes(const int rows, tlsph_real *lanes) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+        TLSPHI_UNROLL for (int i = 0; i < rows; i++) lanes[(size_t)i * TLSPHI_LANES + l] = 0;
+}
 /* Corrects a raw sum of a scalar's gradient: out = M grad. */
 TLSPHI_INLINE void tlsphi_correct_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
                                         tlsph_real *out) {
@@ -4662,10 +4667,13 @@ TLSPHI_INLINE void tlsphi_contract(const int n, const tlsph_real *row, const tls
 /* The particles first to last of a tile: n components of each become lanes. */
 TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, size_t first, size_t last,
                                      tlsph_real *to) {
-    if (last - first == TLSPHI_LANES) tlsphi_transpose(from, n, to);
-    else
-        for (size_t l = first; l < last; l++)
-            for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
+    if (last - first == TLSPHI_LANES) {
+        tlsphi_transpose(from, n, to);
+        return;
+    }
+    memset(to, 0, n * TLSPHI_LANES * sizeof *to);
+    for (size_t l = first; l < last; l++)
+        for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
 }
 /* w = v - spin x (x - centre) - mean, to its rows, and grad w = grad v - spin x F in place of G = grad v. As F is the
    gradient of x this saves a gather; it sees x and F of the stage, which is as exact for rigid and affine motions, but
@@ -4675,7 +4683,7 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
                                     size_t last, const int dim, tlsph_real *G) {
     const size_t D = (size_t)dim, dd = D * D;
     const tlsph_real *x = s->linear ? s->X : s->now.x, *v = tlsphi_at(s, s->rows.v, base);
-    tlsph_real arm[3 * TLSPHI_LANES] = {0}, unit[9 * TLSPHI_LANES] = {0}, w[3 * TLSPHI_LANES];
+    tlsph_real arm[3 * TLSPHI_LANES], unit[9 * TLSPHI_LANES], w[3 * TLSPHI_LANES];
     const tlsph_real *F = s->linear ? unit : s->now.F + dd * base;
     tlsph_real spin[3], mean[3], centre[3] = {0, 0, 0};
     for (size_t i = 0; i < 3; i++) {
@@ -4684,6 +4692,7 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
         if (i < D) centre[i] = (tlsph_real)((double)x[D * body->first + i] + body->centre[i]);
     }
     tlsphi_take_lanes(x + D * base, D, first, last, arm);
+    if (s->linear) tlsphi_clear_lanes(9, unit);
     for (size_t i = 0; s->linear && i < D; i++)
         for (size_t l = 0; l < TLSPHI_LANES; l++) unit[(D + 1) * i * TLSPHI_LANES + l] = 1;
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
@@ -4762,7 +4771,10 @@ TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_bloc
     const tlsph_real *a = tlsphi_at(s, 0, base);
     const size_t S = (size_t)s->rows.S * TLSPHI_ROW, theta = (size_t)s->rows.theta * TLSPHI_ROW;
     tlsphi_slopes sum;
-    memset(&sum, 0, sizeof sum);
+    tlsphi_clear_lanes(dim * dim, sum.v);
+    if (with_w) tlsphi_clear_lanes(dim * dim, sum.w);
+    if (with_S) tlsphi_clear_lanes(dim, sum.S);
+    if (with_theta) tlsphi_clear_lanes(dim, sum.theta);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
@@ -5533,7 +5545,11 @@ static void tlsphi_adjoint_block(tlsph_solver *s, tlsphi_block *block) {
 static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin, size_t end,
                              int parts, tlsphi_gathered *out) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, D = (size_t)s->dim;
-    tlsphi_lane_sums sum = {{0}, {0}, {0}, {0}, {0}, {0}, {0}};
+    tlsphi_lane_sums sum;
+    tlsph_real *const scalars[5] = {sum.J, sum.production, sum.heat, sum.source, sum.conduction};
+    tlsphi_clear_lanes(3, sum.T);
+    tlsphi_clear_lanes(3, sum.damped);
+    for (int i = 0; i < 5; i++) tlsphi_clear_lanes(1, scalars[i]);
     if (s->dim == 3 && s->has_J) tlsphi_flux_slots_31(s, block, tile, base, parts, &sum);
     else if (s->dim == 3) tlsphi_flux_slots_30(s, block, tile, base, parts, &sum);
     else if (s->has_J) tlsphi_flux_slots_21(s, block, tile, base, parts, &sum);
@@ -6059,8 +6075,12 @@ static void tlsphi_take_arms(const tlsphi_projection *p, const double origin[3],
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
     const double B = p->stage.b, C = p->stage.c * p->dt;
     const int ahead = p->stage.ahead && !s->linear;
-    double was[3][TLSPHI_LANES] = {{0}}, v[3][TLSPHI_LANES] = {{0}};
-    memset(out, 0, sizeof *out);
+    double was[3][TLSPHI_LANES], v[3][TLSPHI_LANES];
+    if (end - begin < TLSPHI_LANES || s->dim == 2) {
+        memset(out, 0, sizeof *out);
+        memset(was, 0, sizeof was);
+        memset(v, 0, sizeof v);
+    }
     for (size_t a = begin; a < end; a++) out->V[a - base] = (double)s->V[a];
     tlsphi_take_vectors(s->linear ? s->X : s->now.x, s->dim, begin, end, out->X);
     if (ahead) tlsphi_take_vectors(s->old.x, s->dim, begin, end, was);
