@@ -3059,12 +3059,13 @@ static tlsphi_material tlsphi_calibrate(const tlsph_material *m) {
 
 /* The deviatoric energy and its derivatives: Sigma_F = a F, Sigma_H = b H, dpsi/dJ = c. */
 typedef struct tlsphi_deviator {
-    tlsph_real psi, a, b, c, per_J;
+    tlsph_real psi, a, b, c, J23, per_J; /* J23 = J^(-2/3) */
 } tlsphi_deviator;
 
 TLSPHI_INLINE tlsphi_deviator tlsphi_deviatoric(const tlsphi_material *m, tlsph_real I1, tlsph_real I2, tlsph_real J) {
     tlsphi_deviator out;
     const tlsph_real root = tlsphi_inverse_cube_root(J), J23 = root * root;
+    out.J23 = J23;
     out.per_J = J23 * root;
     out.psi = m->zeta * (J23 * I1 - 3);
     out.a = 2 * m->zeta * J23;
@@ -3104,12 +3105,13 @@ TLSPHI_INLINE tlsphi_invariants tlsphi_principal_bounds(tlsph_real I1, tlsph_rea
 }
 TLSPHI_INLINE tlsph_real tlsphi_acoustic_bound(const tlsphi_material *m, const tlsphi_deviator *dev,
                                         const tlsphi_invariants *s) {
-    const tlsph_real per_root = tlsphi_inverse_root(s->L1 * s->LH); /* over J the least stretch over the largest */
-    const tlsph_real ratio = s->L1 * s->LH * per_root * dev->per_J, J2 = dev->per_J * dev->per_J;
-    tlsph_real along = dev->a * (TLSPHI_R(5.0 / 9.0) * s->I1 * s->LH * J2 - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
-    tlsph_real across = dev->a, mixed = dev->a * (ratio - per_root * s->J) * TLSPHI_R(1.0 / 3.0);
+    /* of J^(-1/3) F, whatever the size of J: I1, largest of H^T H, largest over least stretch and its inverse */
+    const tlsph_real I1 = s->I1 * dev->J23, LH = s->LH * dev->J23 * dev->J23, square = s->L1 * dev->J23 * LH;
+    const tlsph_real inverse = tlsphi_inverse_root(square), ratio = square * inverse;
+    tlsph_real along = dev->a * (TLSPHI_R(5.0 / 9.0) * I1 * LH - TLSPHI_R(1.0 / 3.0)) + m->k * s->LH;
+    tlsph_real across = dev->a, mixed = dev->a * (ratio - inverse) * TLSPHI_R(1.0 / 3.0);
     if (m->mooney) {
-        const tlsph_real factor = dev->b * J2 / s->I2;            /* 3 gamma J^-4 / sqrt I2 */
+        const tlsph_real factor = dev->b * dev->per_J * dev->per_J / s->I2; /* 3 gamma J^-4 / sqrt I2 */
         const tlsph_real least = s->J * s->J / s->L1;             /* of H^T H */
         const tlsph_real half = (s->LH - least) / 2, sum = s->I2 + s->LH;
         const tlsph_real bracket = sum * sum - 2 * s->I2 * s->I2;
