@@ -969,10 +969,10 @@ TLSPHI_INLINE int tlsphi_finite(tlsph_real x) {
     memcpy(&bits, &x, sizeof bits);
     return (bits & TLSPHI_EXPONENT) != TLSPHI_EXPONENT;
 }
-/* x^(-1/3) for positive, normal x to the last digit or two: a third of the exponent, taken from the bits, is right within a
-   few percent, and each Newton step 4/3 y - x/3 y^4 doubles the digits (in this form few operations wait for each other, and
-   a material waits for its roots). Inlined where the materials need it, because a call of libm from code that has used wide
-   registers may cost more than all the rest of a material; and the same on every machine. */
+/* x^(-1/3) for positive, normal x to the last digit or two: a third of the exponent, taken from the bits, is right
+   within a few percent, and each Newton step 4/3 y - x/3 y^4 doubles the digits (in this form few operations wait for
+   each other, and a material waits for its roots). Inlined where the materials need it, because a call of libm from code
+   that has used wide registers may cost more than all the rest of a material; and the same on every machine. */
 TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
     tlsph_real y;
     tlsphi_bits bits;
@@ -3147,7 +3147,8 @@ static int tlsphi_has_invariants(tlsph_material_kind kind) {
 TLSPHI_INLINE void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsphi_invariants *s, int coupled,
                           tlsph_response *out) {
     const tlsph_real elastic = tlsphi_acoustic_bound(m, dev, s);
-    const tlsph_real shear = dev->a + dev->b * s->I1 * TLSPHI_R(1.0 / 3.0), per_theta = 1 / m->theta_R, per_c_v = 1 / m->c_v;
+    const tlsph_real shear = dev->a + dev->b * s->I1 * TLSPHI_R(1.0 / 3.0);
+    const tlsph_real per_theta = 1 / m->theta_R, per_c_v = 1 / m->c_v;
     if (m->entropic) {
         out->p_modulus[0] = out->s_modulus[0] = 0;
         out->p_modulus[1] = elastic * per_theta;
@@ -3203,7 +3204,7 @@ TLSPHI_INLINE void tlsphi_respond_inline(const tlsphi_material *m, const tlsph_r
         for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
     }
     const tlsph_real u = m->k / 2 * (J - 1) * (J - 1), du = m->k * (J - 1), thermal = m->beta * m->theta_R;
-    const tlsph_real per_theta = 1 / m->theta_R; /* once for all lanes: a division a component is half of a material's time */
+    const tlsph_real per_theta = 1 / m->theta_R; /* once for all lanes: a division a component took half of the time */
     if (m->entropic) {
         out->energy = thermal * (J - 1);
         out->entropy = (out->energy - dev->psi - u) * per_theta;
@@ -3473,9 +3474,9 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
 
 /* ==== [SOLVER-DATA] ================================================================================================
    All arrays are in the solver's order and lie in one block. D = dimension, DD = D * D. Optional arrays are NULL where
-   the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block order,
-   so their value does not depend on the threads. Vectors have their components side by side; tensors of the state (F, H)
-   and grad v lie by tiles, a component of all its particles side by side, as the loops over lanes take them. */
+   the scene does not need them. Tasks are blocks of particles of one body; sums are made per block and added in block
+   order, so their value does not depend on the threads. Vectors have their components side by side; tensors of the state
+   (F, H) and grad v lie by tiles, a component of all its particles side by side, as the loops over lanes take them. */
 
 /* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
    P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, drift
@@ -3677,7 +3678,7 @@ struct tlsph_solver {
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
     tlsphi_rows rows;
     tlsph_real *row;         /* blocks of rows, see above */
-    tlsph_real *v, *grad_v;  /* velocity; grad v, which is rate_F but for sharp gradients. Both NULL: see tlsphi_take_turn */
+    tlsph_real *v, *grad_v;  /* velocity; grad v, rate_F but for sharp gradients. Both NULL: see tlsphi_take_turn */
     int lanes;               /* fluxes by lanes, see [FLUXES] */
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
@@ -3730,11 +3731,14 @@ TLSPHI_INLINE void tlsphi_row_put(const tlsph_solver *s, int row, const int n, s
     tlsph_real *at = tlsphi_at(s, row, a);
     TLSPHI_UNROLL for (int i = 0; i < n; i++) at[(size_t)i * TLSPHI_ROW] = in[i];
 }
-/* Places of a field of tensors by tiles, and the first component of particle a; the others follow TLSPHI_LANES apart. */
+/* Places of a field of tensors by tiles, and of the first component of particle a; the others follow TLSPHI_LANES
+   apart. */
 TLSPHI_INLINE size_t tlsphi_tensor_reals(size_t n, size_t dd) {
     return (n + TLSPHI_LANES - 1) / TLSPHI_LANES * TLSPHI_LANES * dd;
 }
-TLSPHI_INLINE size_t tlsphi_tensor_at(size_t dd, size_t a) { return a / TLSPHI_LANES * dd * TLSPHI_LANES + a % TLSPHI_LANES; }
+TLSPHI_INLINE size_t tlsphi_tensor_at(size_t dd, size_t a) {
+    return a / TLSPHI_LANES * dd * TLSPHI_LANES + a % TLSPHI_LANES;
+}
 TLSPHI_INLINE void tlsphi_tensor_get(const tlsph_real *field, const int dd, size_t a, tlsph_real *out) {
     const tlsph_real *at = field + tlsphi_tensor_at((size_t)dd, a);
     TLSPHI_UNROLL for (int i = 0; i < dd; i++) out[i] = at[(size_t)i * TLSPHI_LANES];
@@ -4054,7 +4058,8 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
 /* A tile's state as lanes. */
 typedef struct tlsphi_state_lanes {
     const tlsph_real *F, *H;
-    tlsph_real v[3 * TLSPHI_LANES], J[TLSPHI_LANES], E[TLSPHI_LANES], c_p[TLSPHI_LANES], heat[TLSPHI_LANES], good[TLSPHI_LANES];
+    tlsph_real v[3 * TLSPHI_LANES], J[TLSPHI_LANES], E[TLSPHI_LANES], c_p[TLSPHI_LANES];
+    tlsph_real heat[TLSPHI_LANES], good[TLSPHI_LANES];
 } tlsphi_state_lanes;
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
@@ -4177,22 +4182,25 @@ TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, con
         TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) row[(size_t)i * TLSPHI_ROW + l] = C[i];
     }
 }
+static tlsph_real tlsphi_least_lane(const tlsph_real *lanes) {
+    tlsph_real least = 1 / TLSPHI_TINY;
+    for (size_t l = 0; l < TLSPHI_LANES; l++) least = tlsphi_min(least, lanes[l]);
+    return least;
+}
 /* Longest steps of the particles of a tile: as tlsphi_particle_step. */
 static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_state_lanes *x) {
     const tlsph_real *tau = s->tau + begin;
-    tlsph_real least = 1 / TLSPHI_TINY;
-    for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        const tlsph_real beside = s->beside ? s->beside[2 * (begin + l)] : 1;
-        least = tlsphi_min(least, beside * tau[l] / tlsphi_max(x->c_p[l], TLSPHI_TINY));
-    }
-    if (s->step_rule == TLSPH_STEP_BY_PARTICLE)
-        block->time_step = tlsphi_dmin(block->time_step, (double)s->cfl * (double)least);
+    tlsph_real dt[TLSPHI_LANES];
+    if (s->step_rule != TLSPH_STEP_BY_PARTICLE) return;
+    for (size_t l = 0; l < TLSPHI_LANES; l++) dt[l] = tau[l] / tlsphi_max(x->c_p[l], TLSPHI_TINY);
+    for (size_t l = 0; s->beside && l < TLSPHI_LANES; l++) dt[l] *= s->beside[2 * (begin + l)];
+    block->time_step = tlsphi_dmin(block->time_step, (double)s->cfl * (double)tlsphi_least_lane(dt));
 }
 /* The diffusive limit; before P and H are corrected. */
 TLSPHI_INLINE void tlsphi_tile_heat_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_material *m,
                                          const tlsphi_state_lanes *x, const int dim) {
     const tlsph_real *tau = s->tau + begin, *row = tlsphi_at(s, s->rows.A, begin);
-    tlsph_real least = 1 / TLSPHI_TINY;
+    tlsph_real dt[TLSPHI_LANES];
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         const tlsph_real h = s->beside ? s->beside[2 * (begin + l) + 1] : m->h;
         tlsph_real in_plane[9], H[9], HtH[9];
@@ -4200,10 +4208,10 @@ TLSPHI_INLINE void tlsphi_tile_heat_step(tlsph_solver *s, tlsphi_block *block, s
         tlsphi_expand(dim, in_plane, dim == 3 ? 0 : in_plane[0] * in_plane[3] - in_plane[1] * in_plane[2], H);
         tlsphi_product_transposed(3, H, H, HtH); /* H H^T: its eigenvalues are those of H^T H */
         const tlsph_real bound = tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
-        least = tlsphi_min(least, tau[l] * tau[l] * x->J[l] / tlsphi_max(h * bound, TLSPHI_TINY));
+        dt[l] = tau[l] * tau[l] * x->J[l] / tlsphi_max(h * bound, TLSPHI_TINY);
     }
     const double per = 2 * dim, sharp = s->sharp ? TLSPHI_SHARP_STEP * TLSPHI_SHARP_STEP : 1;
-    const double heat = 0.8 * (double)m->c_v * sharp * (double)least / per;
+    const double heat = 0.8 * (double)m->c_v * sharp * (double)tlsphi_least_lane(dt) / per;
     block->heat_step = tlsphi_dmin(block->heat_step, heat);
     if (!s->super.most) block->time_step = tlsphi_dmin(block->time_step, heat);
 }
@@ -4639,7 +4647,8 @@ TLSPHI_INLINE void tlsphi_store_lanes(const int rows, const tlsph_real *lanes, s
             for (size_t l = first; l < end; l++) to[l] = from[l];
     }
 }
-TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, size_t first, size_t end, tlsph_real *row) {
+TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, size_t first, size_t end,
+                                     tlsph_real *row) {
     tlsphi_store_lanes(rows, lanes, first, end, TLSPHI_ROW, row);
 }
 /* G = scale G M^T for `rows` gradients a lane; M is NULL, or that of the tile's particles as lanes. */
@@ -4716,7 +4725,8 @@ TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *bo
 /* M^T Q/theta = -h/(J theta) A^T A G with A = H M and the raw gradient G = scale sum of theta (000-56). */
 TLSPHI_INLINE void tlsphi_heat_flux_lanes(const tlsph_solver *s, size_t base, const int dim, const tlsph_real *scale,
                                           const tlsph_real *sum, tlsph_real *heat) {
-    const tlsph_real *row = tlsphi_at(s, s->rows.A, base), *theta = tlsphi_theta(s, base), *h_J = tlsphi_at(s, s->rows.h_J, base);
+    const tlsph_real *row = tlsphi_at(s, s->rows.A, base), *theta = tlsphi_theta(s, base);
+    const tlsph_real *h_J = tlsphi_at(s, s->rows.h_J, base);
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsph_real A[9], G[3], push[3], out[3];
         tlsphi_take_rows(dim * dim, row + l, A);
@@ -4846,7 +4856,8 @@ static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     }
 }
 
-/* The same from the gradient, where that is not the raw sum's. Q = -h/J H^T H grad theta is mirrored like the gradient, so that both stay adjoint. */
+/* The same from the gradient, where that is not the raw sum's. Q = -h/J H^T H grad theta is mirrored like the gradient,
+   so that both stay adjoint. */
 static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
     const int dim = s->dim;
     tlsphi_point pt;
@@ -5381,8 +5392,8 @@ typedef struct tlsphi_lane_sums {
     tlsph_real heat[TLSPHI_LANES], source[TLSPHI_LANES], conduction[TLSPHI_LANES];
 } tlsphi_lane_sums;
 
-/* The rows [first, end) of the tile itself, close together: that saves an address a row, which a compiler would keep, and
-   load for every pair. */
+/* The rows [first, end) of the tile itself, close together: that saves an address a row, which a compiler would keep and
+   load again for every pair. */
 TLSPHI_INLINE void tlsphi_take_tile(const tlsph_real *row, int first, int end, tlsph_real *out) {
     for (size_t i = (size_t)first; i < (size_t)end; i++)
         memcpy(out + i * TLSPHI_LANES, row + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *out);
@@ -6949,8 +6960,9 @@ TLSPHI_INLINE void tlsphi_deform_lanes(tlsph_solver *s, const tlsphi_state *u, c
                                        const tlsph_real turn[3], size_t base, size_t first, size_t last, const int dim,
                                        const int has_H, tlsph_real B, tlsph_real C) {
     const size_t D = (size_t)dim, dd = D * D, at = dd * base;
-    const tlsph_real *u_F = u->F + at, *u_H = u->H + (has_H ? at : 0), *old_F = s->old.F + at, *old_H = s->old.H + (has_H ? at : 0);
-    tlsph_real *now_F = s->now.F + at, *now_H = s->now.H + (has_H ? at : 0);
+    const tlsph_real *u_F = u->F + at, *u_H = has_H ? u->H + at : NULL;
+    const tlsph_real *old_F = s->old.F + at, *old_H = has_H ? s->old.H + at : NULL;
+    tlsph_real *now_F = s->now.F + at, *now_H = has_H ? s->now.H + at : NULL;
     TLSPHI_EACH_LANE for (size_t l = first; l < last; l++) {
         tlsph_real u_in[9], G_in[9], F[9], G[9], rate[9], out[9];
         TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) u_in[i] = u_F[i * TLSPHI_LANES + l];
@@ -6985,7 +6997,8 @@ TLSPHI_INLINE void tlsphi_deform_tile(tlsph_solver *s, const tlsphi_state *u, co
     else if (s->has_H) tlsphi_deform_lanes(s, u, from, apart, turn, base, first, last, dim, 1, B, C);
     else tlsphi_deform_lanes(s, u, from, apart, turn, base, first, last, dim, 0, B, C);
 }
-static void tlsphi_deform(tlsph_solver *s, const tlsphi_state *u, const tlsphi_block *block, tlsph_real B, tlsph_real C) {
+static void tlsphi_deform(tlsph_solver *s, const tlsphi_state *u, const tlsphi_block *block, tlsph_real B,
+                          tlsph_real C) {
     const size_t dd = (size_t)(s->dim * s->dim);
     tlsph_real turn[3] = {0, 0, 0};
     for (int i = 0; i < 3 && !s->rate_F && s->projection; i++) turn[i] = (tlsph_real)s->body[block->body].turn[i];
@@ -8103,8 +8116,8 @@ static int tlsphi_state_arrays(const tlsph_solver *s, tlsphi_saved out[8]) {
 }
 /* Component i of the particle with host's number h. */
 static tlsph_real *tlsphi_saved_at(const tlsph_solver *s, const tlsphi_saved *saved, size_t h, size_t i) {
-    const size_t a = s->inner[h], first = saved->apart > 1 ? tlsphi_tensor_at(saved->components, a) : saved->components * a;
-    return saved->array + first + i * saved->apart;
+    const size_t a = s->inner[h], n = saved->components;
+    return saved->array + (saved->apart > 1 ? tlsphi_tensor_at(n, a) : n * a) + i * saved->apart;
 }
 TLSPHI_DEF size_t tlsph_save_size(const tlsph_solver *s) {
     tlsphi_saved saved[8];
@@ -8170,7 +8183,8 @@ TLSPHI_DEF tlsph_result tlsph_restore(tlsph_solver *s, const void *buffer, size_
     const int arrays = tlsphi_state_arrays(s, saved);
     for (int k = 0; k < arrays; k++)
         for (size_t h = 0; h < s->n; h++)
-            for (size_t i = 0; i < saved[k].components; i++) *tlsphi_saved_at(s, saved + k, h, i) = tlsphi_get_real(&at);
+            for (size_t i = 0; i < saved[k].components; i++)
+                *tlsphi_saved_at(s, saved + k, h, i) = tlsphi_get_real(&at);
     const int finite = tlsphi_finite((tlsph_real)time) && tlsphi_all_finite(s->now_memory, s->state_reals);
     if (!finite || tlsphi_evaluate(s)) { /* a checksum can be forged */
         tlsphi_restore_state(s);
@@ -8882,7 +8896,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->gathers_w = s->projection && (s->thermal || s->turns || s->frozen || s->bonds || s->sharp || s->incompressible ||
                                      s->rates.levels > 1); /* F is not that of the pass */
     s->keeps_rate = s->gathers_w || s->linear || s->sharp || s->leaps || s->bonds || s->images || s->incompressible ||
-                    s->rates.levels > 1 || tlsphi_has_moments(d);
+                    tlsphi_has_moments(d);
     s->rows = tlsphi_rows_of(s->dim, s->has_J, s->thermal, s->conducts, s->sharp);
     if (s->dissipation == TLSPH_JST) {
         s->rows.lap_p = s->rows.count;
