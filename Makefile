@@ -2,7 +2,7 @@
 #
 #   make            examples -> build/<example>         make test    unit and physics tests, about 4 minutes
 #   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
-#   make bench      timings and short study, 10 min     make bench-full    the whole study, more than an hour
+#   make bench      timings and short study, 10 min     make bench-full    the whole study, 2 hours
 #   make extremes   how far it goes, a table, 6 min     make coverage, make clean
 #   make portability    the tests with other compilers, C libraries, machines and systems, as far as installed
 #
