@@ -606,14 +606,13 @@ typedef struct tlsph_cloud {
 } tlsph_cloud;
 
 /* A solver's discrete operator, read-only, in the solver's own order (see tlsph_operator_view).
-   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab, with C_ab = M_a g_ab + r_ab, M_a = I and r_ab = 0 where they are NULL. */
+   grad f_a = 1/V_a sum_b (f_b - f_a)/2 (x) C_ab, with C_ab = M_a g_ab + r_ab, r_ab = 0 where `rests` is NULL. */
 typedef struct tlsph_operator {
     size_t count, pairs;
-    int dimension;
+    int dimension, corrected;      /* 1: M_a by tlsph_correction_read, 0: M_a = I */
     const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1 */
     const uint32_t *neighbours;    /* b, solver's order; NULL where desc.keep_pairs is 0 */
     const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric; NULL like these */
-    const tlsph_real *correction;  /* M_a, dimension^2 each, or NULL */
     const tlsph_real *rests;       /* r_ab, `dimension` each, or NULL */
     const tlsph_real *volumes;     /* V_a */
     const tlsph_real *boundary;    /* B_a, `dimension` each */
@@ -759,6 +758,8 @@ TLSPH_API int tlsph_field_components(tlsph_field field);
 /* Number of connected bodies. */
 TLSPH_API size_t tlsph_body_count(const tlsph_solver *solver);
 TLSPH_API void tlsph_operator_view(const tlsph_solver *solver, tlsph_operator *view);
+/* M_a (9, row-major) of particle a of that view, a < count. */
+TLSPH_API void tlsph_correction_read(const tlsph_solver *solver, size_t a, tlsph_real *M);
 TLSPH_API void tlsph_size_read(const tlsph_solver *solver, tlsph_size *size);
 /* What a created scene will cost until end_time (s) and what looks wrong about it; what is certainly wrong, tlsph_create
    has refused. */
@@ -1445,6 +1446,12 @@ typedef struct tlsphi_slot {
     uint32_t from;    /* first of the neighbours side by side, or where the lanes' neighbours begin in `gathered` */
     uint32_t scattered;
 } tlsphi_slot;
+/* Different sets of numbers, each of which is stored once. */
+typedef struct tlsphi_patterns {
+    size_t count, room;
+    tlsph_real *pattern;
+    uint32_t *seen; /* hash table, number + 1 */
+} tlsphi_patterns;
 typedef struct tlsphi_graph {
     size_t tiles, slots, patterns, gathers;
     size_t *first; /* slot of each tile; tiles in the order of the blocks */
@@ -1474,6 +1481,8 @@ typedef struct tlsphi_plan {
     struct tlsphi_lines *lattice; /* TLSPH_CELLS_4 */
     size_t damped_pairs, images;
     double *correction;     /* kernels: M_a, dim x dim each, host order */
+    tlsphi_patterns M;      /* the same by tiles */
+    uint32_t *M_of;
     size_t *closed_first;   /* TLSPH_CLOSED: neighbour lists and C_ab, host order; NULL until they are solved */
     uint32_t *closed_list;
     double *closed_C;
@@ -3656,7 +3665,9 @@ struct tlsph_solver {
     /* operator */
     size_t *first;
     uint32_t *neighbour; /* NULL without keeps_pairs, like g */
-    tlsph_real *g, *M, *rest; /* rest: r_ab, see [BONDS] */
+    tlsph_real *g, *rest; /* rest: r_ab, see [BONDS] */
+    uint32_t *M_of;       /* the pattern of M of each tile of TLSPHI_LANES particles, in M (NULL: all are I); */
+    tlsph_real *M;        /* DD x lanes each; a lattice has few */
     size_t *damped_first; /* the pairs of the dissipation: the same arrays, but for TLSPH_CELLS_4 */
     uint32_t *damped_neighbour;
     tlsph_real *damped_g;
@@ -3752,6 +3763,42 @@ static void tlsphi_tensor_expand(const tlsph_real *field, int dim, size_t a, tls
     tlsph_real in_plane[9];
     tlsphi_tensor_get(field, dim * dim, a, in_plane);
     tlsphi_expand(dim, in_plane, third, out);
+}
+
+/* M of the particles of a tile, as lanes, and of one of them. */
+TLSPHI_INLINE const tlsph_real *tlsphi_correction_lanes(const tlsph_solver *s, size_t a) {
+    return s->M + (size_t)s->M_of[a / TLSPHI_LANES] * (size_t)(s->dim * s->dim) * TLSPHI_LANES;
+}
+TLSPHI_INLINE int tlsphi_correction(const tlsph_solver *s, size_t a, const int dim, tlsph_real *out) {
+    if (!s->M) return 0;
+    tlsphi_take_apart(dim * dim, tlsphi_correction_lanes(s, a) + a % TLSPHI_LANES, TLSPHI_LANES, out);
+    return 1;
+}
+/* out = M_a x, M_a^T x, P M_a, (M_a + M_b) g/2; without M what is given. */
+TLSPHI_INLINE void tlsphi_correct_vector(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *x,
+                                         tlsph_real *out) {
+    tlsph_real M[9];
+    if (tlsphi_correction(s, a, dim, M)) tlsphi_multiply(dim, M, x, out);
+    else memcpy(out, x, (size_t)dim * sizeof *x);
+}
+TLSPHI_INLINE void tlsphi_correct_transposed(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *x,
+                                             tlsph_real *out) {
+    tlsph_real M[9];
+    if (tlsphi_correction(s, a, dim, M)) tlsphi_multiply_transposed(dim, M, x, out);
+    else memcpy(out, x, (size_t)dim * sizeof *x);
+}
+TLSPHI_INLINE void tlsphi_correct_tensor(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *P,
+                                         tlsph_real *out) {
+    tlsph_real M[9];
+    if (tlsphi_correction(s, a, dim, M)) tlsphi_product(dim, P, M, out);
+    else memcpy(out, P, (size_t)(dim * dim) * sizeof *P);
+}
+TLSPHI_INLINE void tlsphi_skew_vector(const tlsph_solver *s, size_t a, size_t b, const int dim, const tlsph_real *g,
+                                      tlsph_real *out) {
+    tlsph_real M_a[9], M_b[9];
+    if (tlsphi_correction(s, a, dim, M_a) && tlsphi_correction(s, b, dim, M_b))
+        tlsphi_multiply_mean(dim, M_a, M_b, g, out);
+    else memcpy(out, g, (size_t)dim * sizeof *g);
 }
 
 /* End of the tile that begins with particle a. */
@@ -3983,15 +4030,13 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     tlsphi_shrink(dim, pt->H, H);
     for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++)
         tlsphi_mirror_tensor(dim, mirror, P);
-    if (s->M) {
-        tlsphi_product(dim, P, s->M + D * D * a, PM);
-        tlsphi_product(dim, H, s->M + D * D * a, A);
-    }
+    tlsphi_correct_tensor(s, a, dim, P, PM);
+    tlsphi_correct_tensor(s, a, dim, H, A);
     for (size_t i = 0; i < D; i++) v[i] = s->now.p[D * a + i] / m->rho;
     tlsphi_row_put(s, r->v, dim, a, v);
     if (!s->projection) tlsphi_row_put(s, r->w, dim, a, v);
-    tlsphi_row_put(s, r->PM, dd, a, s->M ? PM : P);
-    tlsphi_row_put(s, r->A, dd, a, s->M ? A : H);
+    tlsphi_row_put(s, r->PM, dd, a, PM);
+    tlsphi_row_put(s, r->A, dd, a, A);
     tlsphi_row_put(s, r->wave, 4, a, wave);
     if (s->has_J) *tlsphi_at(s, r->S, a) = pt->Sigma_J;
     if (s->thermal) *tlsphi_at(s, r->theta, a) = pt->theta;
@@ -4172,12 +4217,10 @@ static void tlsphi_constitute_tile(const tlsph_solver *s, const tlsphi_material 
 }
 /* P M and H M in the rows of a tile. */
 TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, const int dim) {
-    tlsph_real lanes[9 * TLSPHI_LANES];
-    tlsphi_transpose(M, (size_t)(dim * dim), lanes);
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsph_real A[9], B[9], C[9];
         tlsphi_take_rows(dim * dim, row + l, A);
-        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) B[i] = lanes[(size_t)i * TLSPHI_LANES + l];
+        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) B[i] = M[(size_t)i * TLSPHI_LANES + l];
         tlsphi_product(dim, A, B, C);
         TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) row[(size_t)i * TLSPHI_ROW + l] = C[i];
     }
@@ -4238,8 +4281,8 @@ TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, siz
             memcpy(row + ((size_t)s->rows.w + i) * TLSPHI_ROW, x.v + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *x.v);
     }
     if (s->M) {
-        tlsphi_correct_rows(s->M + dd * begin, row + (size_t)s->rows.PM * TLSPHI_ROW, dim);
-        tlsphi_correct_rows(s->M + dd * begin, row + (size_t)s->rows.A * TLSPHI_ROW, dim);
+        tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), row + (size_t)s->rows.PM * TLSPHI_ROW, dim);
+        tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), row + (size_t)s->rows.A * TLSPHI_ROW, dim);
     }
     return 1;
 }
@@ -4463,15 +4506,14 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
 TLSPHI_INLINE void tlsphi_lever(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *Z, tlsph_real *y) {
     const size_t D = (size_t)s->dim;
     tlsph_real C[3];
-    tlsphi_any_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
+    tlsphi_correct_vector(s, a, s->dim, s->g + D * k, C);
     tlsphi_any_multiply(s->dim, Z, C, y);
     for (size_t i = 0; i < D; i++) y[i] /= 2 * s->V[a];
 }
 /* y_b of the k-th neighbour for o = arm. */
 static tlsph_real tlsphi_share_behind(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *arm) {
-    const size_t D = (size_t)s->dim;
     tlsph_real C[3] = {0, 0, 0};
-    tlsphi_any_multiply(s->dim, s->M + D * D * a, s->g + D * k, C);
+    tlsphi_correct_vector(s, a, s->dim, s->g + (size_t)s->dim * k, C);
     return tlsphi_any_dot(s->dim, arm, C) / (2 * s->V[a]);
 }
 /* The first held part of a particle >= a. */
@@ -4625,12 +4667,6 @@ TLSPHI_INLINE void tlsphi_clear_lanes(const int rows, tlsph_real *lanes) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (int i = 0; i < rows; i++) lanes[(size_t)i * TLSPHI_LANES + l] = 0;
 }
-/* Corrects a raw sum of a scalar's gradient: out = M grad. */
-TLSPHI_INLINE void tlsphi_correct_slope(const tlsph_solver *s, size_t a, const int dim, const tlsph_real *grad,
-                                        tlsph_real *out) {
-    if (s->M) tlsphi_multiply(dim, s->M + (size_t)(dim * dim) * a, grad, out);
-    else memcpy(out, grad, (size_t)dim * sizeof *grad);
-}
 /* Raw sums of a tile: v and w, Sigma_J, theta; by rows of lanes. */
 typedef struct tlsphi_slopes {
     tlsph_real v[9 * TLSPHI_LANES], w[9 * TLSPHI_LANES], S[3 * TLSPHI_LANES],
@@ -4743,14 +4779,10 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
                                        const int dim, int with_w, int with_S, int with_theta, tlsphi_slopes *sum) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
     const int dd = dim * dim;
-    tlsph_real *row = tlsphi_at(s, 0, base), *M = NULL;
-    tlsph_real correction[9 * TLSPHI_LANES], scale[TLSPHI_LANES] = {0}, rate[TLSPHI_LANES];
+    const tlsph_real *M = s->M ? tlsphi_correction_lanes(s, base) : NULL;
+    tlsph_real *row = tlsphi_at(s, 0, base), scale[TLSPHI_LANES] = {0}, rate[TLSPHI_LANES];
     tlsph_real heat[3 * TLSPHI_LANES];
     for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
-    for (size_t l = first; s->M && l < last; l++)
-        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dd; i++) correction[i * TLSPHI_LANES + l] =
-            s->M[(size_t)dd * (base + l) + i];
-    if (s->M) M = correction;
     tlsph_real *const w = with_w ? sum->w : sum->v;
     if (s->rate_E) {
         tlsphi_contract(dd, row + (size_t)s->rows.PM * TLSPHI_ROW, w, scale, rate);
@@ -4871,8 +4903,8 @@ static void tlsphi_heat_flux(tlsph_solver *s, size_t a) {
         if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, Q);
     const tlsph_real factor = -*tlsphi_at(s, s->rows.h_J, a) / *tlsphi_at(s, s->rows.theta, a);
     for (int i = 0; i < dim; i++) Q[i] *= factor;
-    if (s->M) tlsphi_multiply_transposed(dim, s->M + (size_t)(dim * dim) * a, Q, heat);
-    tlsphi_row_put(s, s->rows.heat, dim, a, s->M ? heat : Q);
+    tlsphi_correct_transposed(s, a, dim, Q, heat);
+    tlsphi_row_put(s, s->rows.heat, dim, a, heat);
 }
 
 /* G += spin x F */
@@ -5063,10 +5095,9 @@ static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
 
 static tlsph_real tlsphi_pair_laplacian(const tlsph_solver *s, size_t a, size_t b, size_t k) {
     const int dim = s->dim;
-    const size_t D = (size_t)dim, dd = D * D;
-    tlsph_real d[3] = {0}, C[3] = {s->g[D * k], s->g[D * k + 1], 0};
-    if (dim == 3) C[2] = s->g[D * k + 2];
-    if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, s->g + D * k, C);
+    const size_t D = (size_t)dim;
+    tlsph_real d[3] = {0}, C[3] = {0};
+    tlsphi_skew_vector(s, a, b, dim, s->g + D * k, C);
     for (size_t i = 0; i < D; i++) d[i] = s->X[D * b + i] - s->X[D * a + i];
     return tlsphi_max(tlsphi_dot(dim, C, d), 0) / tlsphi_dot(dim, d, d);
 }
@@ -5079,8 +5110,7 @@ static void tlsphi_laplacian_lean(const tlsph_solver *s, size_t a, tlsph_real le
         const tlsph_real l = s->laplacian[k] / (2 * s->V[a] * s->V[a]);
         for (size_t i = 0; i < D; i++) lean[i] += l * (s->X[D * b + i] - s->X[D * a + i]);
     }
-    memcpy(turned, lean, 3 * sizeof *lean);
-    if (s->M) tlsphi_multiply_transposed(s->dim, s->M + D * D * a, lean, turned);
+    tlsphi_correct_transposed(s, a, s->dim, lean, turned);
 }
 /* rho w of b less that of a */
 TLSPHI_INLINE void tlsphi_momentum_jump(const tlsph_solver *s, size_t a, size_t b, const int dim, tlsph_real *jump) {
@@ -5360,7 +5390,7 @@ TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t
    its own. */
 enum { TLSPHI_STRESSES = 1, TLSPHI_DAMPING = 2, TLSPHI_BOTH = 3 };
 TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, int parts, const int dim, tlsphi_gathered *sum) {
-    const size_t D = (size_t)dim, dd = D * D, *first = parts == TLSPHI_DAMPING ? s->damped_first : s->first;
+    const size_t D = (size_t)dim, *first = parts == TLSPHI_DAMPING ? s->damped_first : s->first;
     const uint32_t *neighbour = parts == TLSPHI_DAMPING ? s->damped_neighbour : s->neighbour;
     const tlsph_real *vectors = parts == TLSPHI_DAMPING ? s->damped_g : s->g;
     if (s->dissipation == TLSPH_NO_DISSIPATION) parts &= TLSPHI_STRESSES;
@@ -5368,8 +5398,7 @@ TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, int parts,
         const size_t b = neighbour[k];
         const tlsph_real *g = vectors + D * k;
         tlsph_real C[3];
-        if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, C);
-        else memcpy(C, g, D * sizeof *C);
+        tlsphi_skew_vector(s, a, b, dim, g, C);
         if (parts & TLSPHI_STRESSES) tlsphi_add_stress(s, a, k, C, dim, sum);
         if (parts & TLSPHI_DAMPING) tlsphi_add_damping_of(s, a, b, k, g, C, dim, sum);
     }
@@ -5541,9 +5570,9 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
         for (size_t i = 0; i < dd; i++) P_D[i] = sum[i * TLSPHI_LANES + p - base] / (2 * s->V[p]);
         for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, p); m && m->particle == p; m++)
             tlsphi_mirror_tensor(dim, m, P_D);
-        if (s->M) tlsphi_product(dim, P_D, s->M + dd * p, PM);
+        tlsphi_correct_tensor(s, p, dim, P_D, PM);
         tlsphi_row_get(s, r.P, (int)dd, p, P);
-        for (size_t i = 0; i < dd; i++) P[i] += s->M ? PM[i] : P_D[i];
+        for (size_t i = 0; i < dd; i++) P[i] += PM[i];
         tlsphi_row_put(s, r.P, (int)dd, p, P);
     }
 }
@@ -6407,8 +6436,7 @@ static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
         tlsphi_load_measures(s, q->first_stage ? &s->old : &s->now, m, a, &pt);
         tlsphi_shrink(s->dim, pt.H, H);
         tlsphi_mirror_all(s, a, H);
-        if (s->M) tlsphi_product(s->dim, H, s->M + dd * a, s->pressure.A + dd * a);
-        else memcpy(s->pressure.A + dd * a, H, dd * sizeof *H);
+        tlsphi_correct_tensor(s, a, s->dim, H, s->pressure.A + dd * a);
         if (q->first_stage) {
             tlsphi_load_measures(s, &s->now, m, a, &next);
             for (int k = 0; k < 9; k++) next.H[k] -= pt.H[k];
@@ -6427,8 +6455,8 @@ TLSPHI_INLINE tlsph_real tlsphi_pressure_pair(const tlsph_solver *s, size_t a, s
     tlsph_real c[3], C[3];
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
     tlsphi_multiply_mean(dim, s->pressure.A + dd * a, s->pressure.A + dd * b, g, c);
-    if (s->M) tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, C);
-    const tlsph_real Cd = tlsphi_dot(dim, s->M ? C : g, d), rho = (tlsphi_material_of(s, a)->rho + tlsphi_material_of(s, b)->rho) / 2;
+    tlsphi_skew_vector(s, a, b, dim, g, C);
+    const tlsph_real Cd = tlsphi_dot(dim, C, d), rho = (tlsphi_material_of(s, a)->rho + tlsphi_material_of(s, b)->rho) / 2;
     return Cd > 0 ? tlsphi_dot(dim, c, c) / (rho * Cd) : 0;
 }
 TLSPHI_INLINE void tlsphi_pressure_diagonal(tlsph_solver *s, const tlsphi_solution *q, size_t a, const int dim) {
@@ -6473,7 +6501,7 @@ TLSPHI_INLINE void tlsphi_pressure_force(const tlsph_solver *s, const tlsphi_sol
         slope[i] *= inverse;
     }
     if (!q->gradient) return;
-    tlsphi_correct_slope(s, a, dim, slope, s->pressure.slope + D * a);
+    tlsphi_correct_vector(s, a, dim, slope, s->pressure.slope + D * a);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
         if (!m->tangent) tlsphi_mirror_vector(dim, m, s->pressure.slope + D * a);
 }
@@ -6508,8 +6536,7 @@ TLSPHI_INLINE void tlsphi_pressure_balance(tlsph_solver *s, const tlsphi_solutio
     if (!q->gradient) return;
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
         if (!m->tangent) tlsphi_mirror_vector(dim, m, back);
-    if (s->M) tlsphi_multiply_transposed(dim, s->M + dd * a, back, s->pressure.back + D * a);
-    else memcpy(s->pressure.back + D * a, back, D * sizeof *back);
+    tlsphi_correct_transposed(s, a, dim, back, s->pressure.back + D * a);
     for (size_t i = D * a; i < D * (a + 1); i++) s->pressure.back[i] /= 2 * s->V[a];
 }
 static void tlsphi_pressure_balance_task(void *arg, size_t i) {
@@ -6771,7 +6798,7 @@ TLSPHI_INLINE void tlsphi_theta_gradient(tlsph_solver *s, size_t a, const int di
         const tlsph_real jump = (*tlsphi_theta(s, s->neighbour[k]) - *tlsphi_theta(s, a)) * half;
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) grad[i] += jump * s->g[D * k + (size_t)i];
     }
-    tlsphi_correct_slope(s, a, dim, grad, slope);
+    tlsphi_correct_vector(s, a, dim, grad, slope);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
         if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, slope);
     tlsphi_row_put(s, s->rows.slope_theta, dim, a, slope);
@@ -6785,20 +6812,17 @@ static void tlsphi_theta_gradient_block(tlsph_solver *s, tlsphi_block *block) {
 }
 /* rate_E becomes d theta/dt, K/s. */
 TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
-    const size_t D = (size_t)dim, dd = D * D;
+    const size_t D = (size_t)dim;
     tlsphi_heat_side side_a, side_b;
     tlsphi_pair_of_heat sum, heat;
     memset(&sum, 0, sizeof sum);
     tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, &side_a);
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
-        const tlsph_real *g = s->g + D * k, *C = g;
+        const tlsph_real *g = s->g + D * k;
         const tlsph_real *rest = s->rest && s->force_form == TLSPH_ADJOINT ? s->rest + D * k : NULL;
-        tlsph_real skew[3];
-        if (s->M) {
-            tlsphi_multiply_mean(dim, s->M + dd * a, s->M + dd * b, g, skew);
-            C = skew;
-        }
+        tlsph_real C[3];
+        tlsphi_skew_vector(s, a, b, dim, g, C);
         tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), TLSPHI_ROW, dim, &side_b);
         tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
                          TLSPH_ENERGY, s->conduction == TLSPH_COMPACT, &heat);
@@ -8046,15 +8070,21 @@ TLSPHI_DEF void tlsph_operator_view(const tlsph_solver *s, tlsph_operator *view)
     view->count = s->n;
     view->pairs = s->pairs;
     view->dimension = s->dim;
+    view->corrected = s->corrected;
     view->first = s->first;
     view->neighbours = s->neighbour;
     view->vectors = s->g;
-    view->correction = s->M;
     view->rests = s->rest;
     view->volumes = s->V;
     view->boundary = s->B;
     view->spacing = s->tau;
     view->host = s->host;
+}
+
+TLSPHI_DEF void tlsph_correction_read(const tlsph_solver *s, size_t a, tlsph_real *M) {
+    tlsph_real in_plane[9];
+    for (int i = 0; i < 9; i++) M[i] = i % 4 == 0;
+    if (tlsphi_correction(s, a, s->dim, in_plane)) tlsphi_expand(s->dim, in_plane, 1, M);
 }
 
 /* ==== [CHECKPOINT] =================================================================================================
@@ -8538,11 +8568,23 @@ typedef struct tlsphi_tiler {
     double *g;                /* lanes x most x D */
     tlsph_real *size, *along; /* lanes x most: |C_ab|, C_ab . d_ab */
     uint8_t *done;            /* lanes x most */
-    size_t slot_room, pattern_room, gather_room;
-    uint32_t *seen; /* hash table of patterns, number + 1 */
+    size_t slot_room, gather_room;
+    tlsphi_patterns patterns;
     tlsph_real pattern[5 * TLSPHI_LANES];
 } tlsphi_tiler;
 
+/* Number of a set of numbers among its equals; TLSPHI_NONE if there is no memory. */
+static uint32_t tlsphi_pattern_number(tlsphi_plan *plan, tlsphi_patterns *p, const tlsph_real *pattern, size_t reals) {
+    const size_t bytes = reals * sizeof *pattern;
+    const uint64_t hash = tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)(const void *)pattern, bytes);
+    size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
+    for (int probe = 0; probe < 8 && p->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
+        if (memcmp(p->pattern + (p->seen[at] - 1) * reals, pattern, bytes) == 0) return p->seen[at] - 1;
+    if (!tlsphi_scratch_room(plan, (void **)&p->pattern, &p->room, p->count + 1, bytes)) return TLSPHI_NONE;
+    memcpy(p->pattern + p->count * reals, pattern, bytes);
+    p->seen[at] = (uint32_t)++p->count; /* if the table is full there, an older one is forgotten */
+    return p->seen[at] - 1;
+}
 /* Sorts a neighbour list (solver's numbers) with its vectors: memory is then walked forwards. */
 static void tlsphi_sort_pairs(int dim, uint32_t *list, double *g, size_t count) {
     for (size_t i = 1; i < count; i++) {
@@ -8598,20 +8640,6 @@ static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
     }
     t->count[lane] = count;
 }
-/* Number of the pattern in t->pattern; TLSPHI_NONE if there is no memory. */
-static uint32_t tlsphi_tile_pattern(tlsphi_tiler *t) {
-    tlsphi_graph *graph = t->graph;
-    const size_t reals = (size_t)graph->width * TLSPHI_LANES, bytes = reals * sizeof *t->pattern;
-    const uint64_t hash = tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)(const void *)t->pattern, bytes);
-    size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
-    for (int probe = 0; probe < 8 && t->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
-        if (memcmp(graph->pattern + (t->seen[at] - 1) * reals, t->pattern, bytes) == 0) return t->seen[at] - 1;
-    if (!tlsphi_scratch_room(t->plan, (void **)&graph->pattern, &t->pattern_room, graph->patterns + 1, bytes))
-        return TLSPHI_NONE;
-    memcpy(graph->pattern + graph->patterns * reals, t->pattern, bytes);
-    t->seen[at] = (uint32_t)++graph->patterns; /* if the table is full there, an older one is forgotten */
-    return t->seen[at] - 1;
-}
 static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
     const size_t D = (size_t)t->plan->dim, at = lane * t->most + i;
     t->done[at] = 1;
@@ -8622,7 +8650,8 @@ static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
 /* Closes a slot: the pattern is set; `from` is the first neighbour, or, scattered, the place of the list. */
 static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
     tlsphi_graph *graph = t->graph;
-    const uint32_t pattern = tlsphi_tile_pattern(t);
+    const uint32_t pattern =
+        tlsphi_pattern_number(t->plan, &t->patterns, t->pattern, (size_t)graph->width * TLSPHI_LANES);
     memset(t->pattern, 0, sizeof t->pattern);
     if (pattern == TLSPHI_NONE ||
         !tlsphi_scratch_room(t->plan, (void **)&graph->slot, &t->slot_room, graph->slots + 1, sizeof *graph->slot))
@@ -8700,10 +8729,10 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->size = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->along = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->done = TLSPHI_SCRATCH(plan, uint8_t, all);
-    t->seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
+    t->patterns.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     for (size_t a = 0; a < n; a++) t->graph->tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
     t->graph->first = TLSPHI_SCRATCH(plan, size_t, t->graph->tiles + 1);
-    if (!t->list || !t->g || !t->size || !t->along || !t->done || !t->seen || !t->graph->first)
+    if (!t->list || !t->g || !t->size || !t->along || !t->done || !t->patterns.seen || !t->graph->first)
         return tlsphi_no_memory(plan, 64.0 * (double)all);
     for (size_t tile = 0; t->end < n; tile++) {
         t->begin = t->end;
@@ -8713,10 +8742,31 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
         if (!tlsphi_tile_build(t)) return tlsphi_no_memory(plan, 64.0 * (double)plan->pairs);
         t->graph->first[tile + 1] = t->graph->slots;
     }
+    t->graph->patterns = t->patterns.count;
+    t->graph->pattern = t->patterns.pattern;
+    return TLSPH_OK;
+}
+/* M_a as lanes of tiles. */
+static tlsph_result tlsphi_tile_corrections(tlsphi_plan *plan) {
+    const size_t dd = (size_t)(plan->dim * plan->dim), tiles = (plan->n - 1) / TLSPHI_LANES + 1;
+    if (plan->antisymmetric) return TLSPH_OK;
+    plan->M_of = TLSPHI_SCRATCH(plan, uint32_t, tiles);
+    plan->M.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
+    if (!plan->M_of || !plan->M.seen) return tlsphi_no_memory(plan, 4.0 * (double)tiles);
+    for (size_t tile = 0; tile < tiles; tile++) {
+        tlsph_real lanes[9 * TLSPHI_LANES] = {0};
+        for (size_t l = 0; l < TLSPHI_LANES && tile * TLSPHI_LANES + l < plan->n; l++)
+            for (size_t i = 0; i < dd; i++)
+                lanes[i * TLSPHI_LANES + l] =
+                    (tlsph_real)plan->correction[dd * plan->host[tile * TLSPHI_LANES + l] + i];
+        plan->M_of[tile] = tlsphi_pattern_number(plan, &plan->M, lanes, dd * TLSPHI_LANES);
+        if (plan->M_of[tile] == TLSPHI_NONE) return tlsphi_no_memory(plan, 72.0 * (double)plan->n);
+    }
     return TLSPH_OK;
 }
 static tlsph_result tlsphi_tiles(tlsphi_plan *plan) {
-    const tlsph_result r = tlsphi_graph_build(plan, 0);
+    tlsph_result r = tlsphi_tile_corrections(plan);
+    if (!r) r = tlsphi_graph_build(plan, 0);
     return r || !plan->lattice ? r : tlsphi_graph_build(plan, 1);
 }
 
@@ -9030,7 +9080,8 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     tlsphi_layout_state(s, arena);
     tlsphi_layout_work(s, arena);
     tlsphi_layout_pressure(s, arena);
-    if (s->corrected) s->M = TLSPHI_TAKE(arena, tlsph_real, D * D * n);
+    if (s->corrected) s->M_of = TLSPHI_TAKE(arena, uint32_t, (n - 1) / TLSPHI_LANES + 1);
+    if (s->corrected) s->M = TLSPHI_TAKE(arena, tlsph_real, D * D * TLSPHI_LANES * plan->M.count);
     s->fix = TLSPHI_TAKE(arena, tlsphi_fix, s->fixes);
     s->mirror = TLSPHI_TAKE(arena, tlsphi_mirror, s->mirrors ? s->mirrors + 1 : 0);
     if (s->mirrors) s->mirror_of = TLSPHI_TAKE(arena, uint32_t, n);
@@ -9102,9 +9153,9 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
             tlsphi_store_plastic(s->dim, s->thermal, &tlsphi_virgin,
                                  s->now.plastic + tlsphi_plastic_reals(s->dim, s->thermal) * a);
     }
-    for (size_t a = 0; s->M && a < s->n; a++)
-        for (size_t i = 0; i < D * D; i++)
-            s->M[D * D * a + i] = (tlsph_real)plan->correction[D * D * plan->host[a] + i];
+    if (!s->M) return;
+    memcpy(s->M_of, plan->M_of, ((s->n - 1) / TLSPHI_LANES + 1) * sizeof *s->M_of);
+    memcpy(s->M, plan->M.pattern, plan->M.count * D * D * TLSPHI_LANES * sizeof *s->M);
 }
 
 /* Pairs, boundary vectors B_a = -sum_b C_ab^skew and the time step's length tau_a = 2 dim V_a / sum_b |C_ab|. */
@@ -9347,7 +9398,7 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
                 for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
                 h->part = tlsphi_part_of(s, plan, c, a);
                 tlsph_real MB[3] = {0, 0, 0}; /* sum of g is -B */
-                tlsphi_any_multiply(s->dim, s->M + (size_t)(s->dim * s->dim) * a, s->B + (size_t)s->dim * a, MB);
+                tlsphi_correct_vector(s, a, s->dim, s->B + (size_t)s->dim * a, MB);
                 const tlsph_real own = 1 + tlsphi_max(0, tlsphi_any_dot(s->dim, h->part.o, MB)) / (2 * s->V[a]);
                 h->damping = 1 / (own * own);
             }

@@ -183,7 +183,7 @@ static void check_operator(const tlsph_operator *o, double linear)
 {
     const size_t D = (size_t)o->dimension;
     double worst = 0, largest = 0;
-    CHECK(o->correction == NULL);
+    CHECK(!o->corrected);
     for (size_t a = 0; a < o->count; a++)
         for (size_t k = o->first[a]; k < o->first[a + 1]; k++) {
             const size_t b = o->neighbours[k];

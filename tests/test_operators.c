@@ -153,25 +153,26 @@ static void check_antisymmetry(const setup *s, const own_cloud *cloud, tlsph_sol
 
 TEST(pair_vectors_are_antisymmetric) { for_all_setups(check_antisymmetry); }
 
-/* out = M_a g, or g where there is no correction */
-static void corrected(const tlsph_operator *view, size_t a, const tlsph_real *g, double out[3])
+/* out = M_a g */
+static void corrected(const tlsph_solver *solver, size_t d, size_t a, const tlsph_real *g, double out[3])
 {
-    size_t d = (size_t)view->dimension, i, j;
-    for (i = 0; i < d; i++) {
-        out[i] = view->correction ? 0 : (double)g[i];
-        for (j = 0; view->correction && j < d; j++) out[i] += (double)view->correction[(a * d + i) * d + j] * (double)g[j];
+    tlsph_real M[9];
+    tlsph_correction_read(solver, a, M);
+    for (size_t i = 0; i < d; i++) {
+        out[i] = 0;
+        for (size_t j = 0; j < d; j++) out[i] += (double)M[3 * i + j] * (double)g[j];
     }
 }
 
 /* B_a = -sum_b (C_ab - C_ba) / 2 with C_ba = -M_b g_ab */
-static void boundary_by_definition(const tlsph_operator *view, size_t a, double B[3])
+static void boundary_by_definition(const tlsph_solver *solver, const tlsph_operator *view, size_t a, double B[3])
 {
     size_t k, i, d = (size_t)view->dimension;
     B[0] = B[1] = B[2] = 0;
     for (k = view->first[a]; k < view->first[a + 1]; k++) {
         double mine[3], its[3];
-        corrected(view, a, view->vectors + k * d, mine);
-        corrected(view, view->neighbours[k], view->vectors + k * d, its);
+        corrected(solver, d, a, view->vectors + k * d, mine);
+        corrected(solver, d, view->neighbours[k], view->vectors + k * d, its);
         for (i = 0; i < d; i++) B[i] -= 0.5 * (mine[i] + its[i]);
     }
 }
@@ -187,7 +188,7 @@ static void check_boundary(const setup *s, const own_cloud *cloud, tlsph_solver 
     tlsph_operator_view(solver, &view);
     for (a = 0; a < view.count; a++) {
         double B[3];
-        boundary_by_definition(&view, a, B);
+        boundary_by_definition(solver, &view, a, B);
         for (i = 0; i < d; i++) {
             CHECK_CLOSE(view.boundary[a * d + i], B[i], 300 * EPSILON * face);
             CHECK_CLOSE(field[3 * view.host[a] + i], B[i], 300 * EPSILON * face);
@@ -291,7 +292,7 @@ static void check_view_gradient(const setup *s, const own_cloud *cloud, tlsph_so
         for (k = view.first[a]; k < view.first[a + 1]; k++) {
             const tlsph_real *its = v + 3 * view.host[view.neighbours[k]];
             double C[3];
-            corrected(&view, a, view.vectors + k * d, C);
+            corrected(solver, d, a, view.vectors + k * d, C);
             for (i = 0; i < d; i++)
                 for (j = 0; j < d; j++) G[3 * i + j] += ((double)its[i] - (double)mine[i]) / 2 * C[j] / (double)view.volumes[a];
         }
@@ -374,7 +375,7 @@ static void check_cells_and_given(int dimension)
     check_antisymmetry(&s, &cloud, solver);
     check_view_gradient(&s, &cloud, solver);
     tlsph_operator_view(solver, &view);
-    CHECK(view.correction == NULL);
+    CHECK(!view.corrected);
     given = make_given(&cloud, &view, &error);
     if (CHECK(given != NULL)) {
         check_view_gradient(&s, &cloud, given);

@@ -113,7 +113,7 @@ tlsph_result satellite_resultants(const satellite *s, double force[3], double di
     tlsph_operator o;
     tlsph_operator_view(solver, &o);
     f.side = malloc(o.count * sizeof *f.side);
-    const int ready = f.X && f.v && f.F && f.P && f.c_p && f.c_s && f.side && !o.correction;
+    const int ready = f.X && f.v && f.F && f.P && f.c_p && f.c_s && f.side && !o.corrected;
     memset(force, 0, 3 * sizeof *force);
     memset(dissipation, 0, 3 * sizeof *dissipation);
     size[0] = size[1] = 0;
@@ -130,5 +130,5 @@ tlsph_result satellite_resultants(const satellite *s, double force[3], double di
             }
         }
     free(f.X); free(f.v); free(f.F); free(f.P); free(f.c_p); free(f.c_s); free(f.side);
-    return ready ? TLSPH_OK : o.correction ? TLSPH_ERROR_ARGUMENT : TLSPH_ERROR_MEMORY;
+    return ready ? TLSPH_OK : o.corrected ? TLSPH_ERROR_ARGUMENT : TLSPH_ERROR_MEMORY;
 }
