@@ -615,7 +615,6 @@ typedef struct tlsph_operator {
     const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric; NULL like these */
     const tlsph_real *rests;       /* r_ab, `dimension` each, or NULL */
     const tlsph_real *volumes;     /* V_a */
-    const tlsph_real *boundary;    /* B_a, `dimension` each */
     const tlsph_real *spacing;     /* tau_a, the length that the time step sees */
     const uint32_t *host;          /* host number of each */
 } tlsph_operator;
@@ -1493,6 +1492,9 @@ typedef struct tlsphi_plan {
     uint32_t *body;         /* of each particle in solver order */
     uint8_t *level, *seen;  /* [MULTI-RATE], host order, NULL: off; bit l: a neighbour has another level l */
     double *lightest;       /* and root of the least density of the neighbours over the particle's own, at most 1 */
+    uint32_t *found, *B_of; /* solver order: numbers of neighbours; the particles with B_a, */
+    tlsph_real *tau, *B;    /* tau_a; B_a */
+    size_t areas, B_room, B_of_room;
     int levels;
     size_t bodies, blocks;
     tlsphi_graph graph[2];   /* of all pairs; of those of the dissipation, where they are others. See [TILES] */
@@ -3673,7 +3675,10 @@ struct tlsph_solver {
     tlsph_real *damped_g;
     size_t images;
     struct tlsphi_image *image; /* TLSPH_CELLS_4: sorted by particle */
-    tlsph_real *X, *V, *B, *tau;
+    tlsph_real *X, *V, *tau;
+    size_t areas;   /* particles with a boundary vector, */
+    uint32_t *B_of; /* sorted, */
+    tlsph_real *B;  /* D each; see tlsphi_boundary */
     uint32_t *host, *inner;
     /* state, and the state at the beginning of the step */
     tlsphi_state now, old, spare; /* spare: see tlsphi_share_state */
@@ -3819,6 +3824,11 @@ static size_t tlsphi_find_particle(const void *list, size_t count, size_t size, 
         else high = middle;
     }
     return low;
+}
+static const tlsph_real *tlsphi_boundary(const tlsph_solver *s, size_t a) {
+    static const tlsph_real none[3] = {0, 0, 0};
+    const size_t i = tlsphi_find_particle(s->B_of, s->areas, sizeof *s->B_of, a);
+    return i < s->areas && s->B_of[i] == a ? s->B + (size_t)s->dim * i : none;
 }
 /* Runs task(arg, i) for every block i. */
 static void tlsphi_run_tasks(const tlsph_solver *s, tlsph_task_fn task, void *arg) {
@@ -7923,7 +7933,7 @@ static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field
         return 1;
     case TLSPH_FIELD_VELOCITY: tlsphi_out_vector(dim, s->now.p + D * a, 1 / rho, out); return 1;
     case TLSPH_FIELD_MOMENTUM: tlsphi_out_vector(dim, s->now.p + D * a, 1, out); return 1;
-    case TLSPH_FIELD_BOUNDARY_AREA: tlsphi_out_vector(dim, s->B + D * a, 1, out); return 1;
+    case TLSPH_FIELD_BOUNDARY_AREA: tlsphi_out_vector(dim, tlsphi_boundary(s, a), 1, out); return 1;
     case TLSPH_FIELD_F: tlsphi_tensor_expand(s->now.F, dim, a, 1, out); return 1;
     case TLSPH_FIELD_VELOCITY_GRADIENT:
         tlsphi_velocity_gradient(s, tlsphi_body_of(s, a), a, G);
@@ -8076,7 +8086,6 @@ TLSPHI_DEF void tlsph_operator_view(const tlsph_solver *s, tlsph_operator *view)
     view->vectors = s->g;
     view->rests = s->rest;
     view->volumes = s->V;
-    view->boundary = s->B;
     view->spacing = s->tau;
     view->host = s->host;
 }
@@ -8615,10 +8624,34 @@ static size_t tlsphi_damped_pairs_of(const tlsphi_plan *plan, size_t a, uint32_t
     }
     return count;
 }
-/* Pairs of a lane in the solver's numbers; g becomes the vector that the solver stores. */
-static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
-    const tlsphi_plan *plan = t->plan;
+/* What the pairs of a particle add up to: boundary vector B_a = -sum_b C_ab^skew, and the time step's length
+   tau_a = 2 dim V_a / sum_b |C_ab|. B of the size of round-off is 0. With TLSPH_CELLS_4 both come from the cells: smaller
+   volumes at free faces and edges did not lower the stable step. */
+TLSPHI_APART int tlsphi_plan_sums(tlsphi_plan *plan, size_t a, double *B, double sum) {
+    const size_t D = (size_t)plan->dim, h = plan->host[a];
+    plan->tau[a] = (tlsph_real)(2 * plan->dim * tlsphi_plan_volume(plan, h) / sum /
+                                (plan->desc->sharp_gradients ? TLSPHI_SHARP_STEP : 1));
+    if (plan->lattice) {
+        tlsphi_stencil stencil;
+        tlsphi_stencil_of(plan, h, &stencil);
+        memcpy(B, stencil.B, sizeof stencil.B);
+        plan->tau[a] = (tlsph_real)(plan->dim / (stencil.fineness[0] + stencil.fineness[1] + stencil.fineness[2]));
+    }
+    if (sqrt(tlsphi_norm2(B)) <= 256 * TLSPHI_EPSILON * sum) return 1;
+    if (!tlsphi_scratch_room(plan, (void **)&plan->B_of, &plan->B_of_room, plan->areas + 1, sizeof *plan->B_of) ||
+        !tlsphi_scratch_room(plan, (void **)&plan->B, &plan->B_room, plan->areas + 1, D * sizeof *plan->B))
+        return 0;
+    plan->B_of[plan->areas] = (uint32_t)a;
+    for (size_t k = 0; k < D; k++) plan->B[D * plan->areas + k] = (tlsph_real)B[k];
+    plan->areas++;
+    return 1;
+}
+/* Pairs of a lane in the solver's numbers; g becomes the vector that the solver stores. 0 if there is no memory. */
+static int tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
+    tlsphi_plan *plan = t->plan;
     const size_t D = (size_t)plan->dim, lane = a - t->base, h = plan->host[a];
+    const int behind = plan->closed_C && !plan->antisymmetric; /* sum g is the area vector; tau by the longer of C_ab, C_ba */
+    double B[3] = {0, 0, 0}, sum = 0;
     uint32_t *list = t->list + lane * t->most;
     double *g = t->g + D * lane * t->most;
     const size_t count = t->damped ? tlsphi_damped_pairs_of(plan, h, list, g) : tlsphi_neighbours_of(plan, h, list, g);
@@ -8628,6 +8661,9 @@ static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, C[3] = {0, 0, 0};
         if (t->damped) memcpy(C, g + D * i, D * sizeof *C);
         else tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, C);
+        const double square = tlsphi_dot3(mine, mine);
+        for (size_t k = 0; k < D; k++) B[k] -= behind ? g[D * i + k] : C[k];
+        sum += sqrt(behind ? tlsphi_dmax(square, tlsphi_dot3(other, other)) : square);
         double size = sqrt(tlsphi_norm2(C));
         if (plan->correction) tlsphi_round_vectors(plan, &size, 1);
         double d[3] = {0, 0, 0}, along;
@@ -8639,6 +8675,9 @@ static void tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         for (size_t k = 0; k < D && plan->antisymmetric; k++) g[D * i + k] = C[k];
     }
     t->count[lane] = count;
+    if (t->damped) return 1;
+    plan->found[a] = (uint32_t)count;
+    return tlsphi_plan_sums(plan, a, B, sum);
 }
 static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
     const size_t D = (size_t)t->plan->dim, at = lane * t->most + i;
@@ -8705,7 +8744,8 @@ static int tlsphi_tile_build(tlsphi_tiler *t) {
     int more = 1;
     memset(t->count, 0, sizeof t->count);
     memset(t->done, 0, TLSPHI_LANES * t->most);
-    for (size_t a = t->begin; a < t->end; a++) tlsphi_tile_lane(t, a);
+    for (size_t a = t->begin; a < t->end; a++)
+        if (!tlsphi_tile_lane(t, a)) return 0;
     for (size_t lane = t->begin - t->base; lane < t->end - t->base; lane++)
         for (size_t i = 0; i < t->count[lane]; i++) {
             const size_t at = lane * t->most + i;
@@ -8766,6 +8806,9 @@ static tlsph_result tlsphi_tile_corrections(tlsphi_plan *plan) {
 }
 static tlsph_result tlsphi_tiles(tlsphi_plan *plan) {
     tlsph_result r = tlsphi_tile_corrections(plan);
+    plan->found = TLSPHI_SCRATCH(plan, uint32_t, plan->n);
+    plan->tau = TLSPHI_SCRATCH(plan, tlsph_real, plan->n);
+    if (!r && (!plan->found || !plan->tau)) return tlsphi_no_memory(plan, 12.0 * (double)plan->n);
     if (!r) r = tlsphi_graph_build(plan, 0);
     return r || !plan->lattice ? r : tlsphi_graph_build(plan, 1);
 }
@@ -9075,7 +9118,9 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->inner = TLSPHI_TAKE(arena, uint32_t, n);
     s->X = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->V = TLSPHI_TAKE(arena, tlsph_real, n);
-    s->B = TLSPHI_TAKE(arena, tlsph_real, D * n);
+    s->areas = plan->areas;
+    s->B_of = TLSPHI_TAKE(arena, uint32_t, s->areas);
+    s->B = TLSPHI_TAKE(arena, tlsph_real, D * s->areas);
     s->tau = TLSPHI_TAKE(arena, tlsph_real, n);
     tlsphi_layout_state(s, arena);
     tlsphi_layout_work(s, arena);
@@ -9158,38 +9203,31 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
     memcpy(s->M, plan->M.pattern, plan->M.count * D * D * TLSPHI_LANES * sizeof *s->M);
 }
 
-/* Pairs, boundary vectors B_a = -sum_b C_ab^skew and the time step's length tau_a = 2 dim V_a / sum_b |C_ab|. */
+/* Boundary vectors, the time step's lengths, and the pairs, where they are kept. */
 static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
     const size_t D = (size_t)s->dim;
-    for (size_t a = 0; a < s->n; a++) {
+    memcpy(s->tau, plan->tau, s->n * sizeof *s->tau);
+    if (s->areas) memcpy(s->B_of, plan->B_of, s->areas * sizeof *s->B_of);
+    if (s->areas) memcpy(s->B, plan->B, D * s->areas * sizeof *s->B);
+    for (size_t a = 0; a < s->n; a++) s->first[a + 1] = s->first[a] + plan->found[a];
+    TLSPH_ASSERT(s->first[s->n] == s->pairs);
+    for (size_t a = 0; s->keeps_pairs && a < s->n; a++) {
         const uint32_t h = plan->host[a];
         const size_t start = s->first[a], count = tlsphi_neighbours_of(plan, h, list, g);
-        double B[3] = {0, 0, 0}, sum = 0;
-        const int behind = plan->closed_C && s->M; /* there sum g is the area vector; tau by the longer of C_ab and C_ba */
-        s->first[a + 1] = start + count;
-        TLSPH_ASSERT(start + count <= s->pairs);
         for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
         tlsphi_sort_pairs(s->dim, list, g, count);
         for (size_t i = 0; i < count; i++) {
-            double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, middle[3], square = 0;
-            tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, middle);
-            if (s->keeps_pairs) s->neighbour[start + i] = list[i];
+            double mine[3] = {0, 0, 0}, other[3] = {0, 0, 0}, C[3];
+            tlsphi_pair_vectors(plan, h, plan->host[list[i]], g + D * i, mine, other, C);
+            s->neighbour[start + i] = list[i];
             for (size_t k = 0; k < D; k++) {
-                const double C = middle[k];
-                if (s->rest) s->rest[D * (start + i) + k] = (tlsph_real)(mine[k] - C);
-                if (s->keeps_pairs) s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C);
-                B[k] -= behind ? g[D * i + k] : C;
-                square += mine[k] * mine[k];
+                if (s->rest) s->rest[D * (start + i) + k] = (tlsph_real)(mine[k] - C[k]);
+                s->g[D * (start + i) + k] = (tlsph_real)(s->M ? g[D * i + k] : C[k]);
             }
-            sum += sqrt(behind ? tlsphi_dmax(square, tlsphi_dot3(other, other)) : square);
         }
-        for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)B[k];
-        s->tau[a] = (tlsph_real)(2 * (double)s->dim * tlsphi_plan_volume(plan, h) / sum /
-                                 (s->sharp ? TLSPHI_SHARP_STEP : 1));
     }
 }
-/* TLSPH_CELLS_4: pairs of the dissipation, areas of the faces, images; the step's length by the cells, as with TLSPH_CELLS:
-   the smaller volumes at free faces and edges did not lower the stable step. */
+/* TLSPH_CELLS_4: pairs of the dissipation, images. */
 static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_t *list, double *g) {
     const size_t D = (size_t)s->dim;
     size_t at = 0, image = 0;
@@ -9204,8 +9242,6 @@ static void tlsphi_fill_fourth(tlsph_solver *s, const tlsphi_plan *plan, uint32_
             for (size_t k = 0; k < D; k++) s->damped_g[D * at + k] = (tlsph_real)g[D * i + k];
         }
         if (s->keeps_pairs) s->damped_first[a + 1] = at;
-        s->tau[a] = (tlsph_real)(s->dim / (stencil.fineness[0] + stencil.fineness[1] + stencil.fineness[2]));
-        for (size_t k = 0; k < D; k++) s->B[D * a + k] = (tlsph_real)stencil.B[k];
         for (int i = 0; i < 6; i++) {
             if (!(stencil.image[i] > 0)) continue;
             s->image[image].particle = (uint32_t)a;
@@ -9336,7 +9372,7 @@ static void tlsphi_fill_turns(tlsph_solver *s) {
 /* Reference area of a load on one particle: given, or from the operator's boundary vector. */
 static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, const tlsph_condition *c, size_t i) {
     const size_t D = (size_t)s->dim, a = load->inner[i];
-    const tlsph_real *B = s->B + D * a, *N = tlsphi_condition_face(s->dim, c);
+    const tlsph_real *B = tlsphi_boundary(s, a), *N = tlsphi_condition_face(s->dim, c);
     const tlsph_real size = N ? tlsphi_sqrt(tlsphi_any_dot(s->dim, N, N)) : 0;
     const tlsph_real along = N ? tlsphi_any_dot(s->dim, B, N) / size : 0, BB = tlsphi_any_dot(s->dim, B, B);
     if (c->kind == TLSPH_PRESSURE) {
@@ -9353,14 +9389,15 @@ static void tlsphi_fill_area(const tlsph_solver *s, const tlsphi_load *load, con
 static tlsphi_part tlsphi_part_of(const tlsph_solver *s, const tlsphi_plan *plan, const tlsph_condition *c, size_t a) {
     const size_t D = (size_t)s->dim;
     const tlsph_real *T = plan->desc->particles.moments + 9 * plan->host[a], *N = tlsphi_condition_face(s->dim, c);
+    const tlsph_real *B = tlsphi_boundary(s, a);
     const tlsph_real NN = N ? tlsphi_any_dot(s->dim, N, N) : 1;
-    const tlsph_real along = N ? tlsphi_any_dot(s->dim, s->B + D * a, N) / NN : 0;
+    const tlsph_real along = N ? tlsphi_any_dot(s->dim, B, N) / NN : 0;
     tlsphi_part out;
     double A[9];
     memset(&out, 0, sizeof out);
     tlsphi_closed_moment(plan, plan->host[a], A);
     for (size_t j = 0; j < D * D; j++) out.W[j] = (tlsph_real)A[3 * (j / D) + j % D] / s->V[a];
-    for (size_t i = 0; i < D; i++) out.B[i] = N ? along * N[i] : s->B[D * a + i];
+    for (size_t i = 0; i < D; i++) out.B[i] = N ? along * N[i] : B[i];
     for (size_t i = 0; i < D * D; i++)
         for (size_t k = 0; k < D; k++)
             out.T[i] += N ? N[i / D] * N[k] * T[3 * k + i % D] / NN : k == i / D ? T[3 * k + i % D] : 0;
@@ -9398,7 +9435,7 @@ static tlsph_result tlsphi_fill_held_parts(tlsph_solver *s, tlsphi_plan *plan) {
                 for (size_t j = 0; j < 3; j++) h->N[j] = (tlsph_real)N[j];
                 h->part = tlsphi_part_of(s, plan, c, a);
                 tlsph_real MB[3] = {0, 0, 0}; /* sum of g is -B */
-                tlsphi_correct_vector(s, a, s->dim, s->B + (size_t)s->dim * a, MB);
+                tlsphi_correct_vector(s, a, s->dim, tlsphi_boundary(s, a), MB);
                 const tlsph_real own = 1 + tlsphi_max(0, tlsphi_any_dot(s->dim, h->part.o, MB)) / (2 * s->V[a]);
                 h->damping = 1 / (own * own);
             }
@@ -11303,7 +11340,7 @@ static int tlsphi_is_irregular(const tlsph_solver *s) {
     for (size_t a = 0; s->M && a < s->n; a++) {
         double B[3];
         if (s->first[a + 1] - s->first[a] < s->size.neighbours_most) continue;
-        tlsphi_vector3(s->B + (size_t)s->dim * a, s->dim, B);
+        tlsphi_vector3(tlsphi_boundary(s, a), s->dim, B);
         inside++;
         open += sqrt(tlsphi_norm2(B)) > 1e-3 * pow((double)s->V[a], (s->dim - 1.0) / s->dim);
     }

@@ -32,12 +32,13 @@ static void algebra(const shape *s, double volume) {
     const double area = s->spacing * s->spacing, cell = area * s->spacing;
     double skew = 0, open = 0, slope = 0, least = HUGE_VAL, total = 0, B[3] = { 0 };
     tlsph_operator o;
-    tlsph_real *X;
+    tlsph_real *X, *areas;
     scene_body body;
     tlsph_error error;
     if (!CHECK_RESULT(make(s, 0, &material, &options, &body, &error), TLSPH_OK)) { printf("%s\n", error.message); return; }
     tlsph_operator_view(body.solver, &o);
     X = scene_read(body.solver, TLSPH_FIELD_REFERENCE_POSITION);
+    areas = scene_read(body.solver, TLSPH_FIELD_BOUNDARY_AREA);
     long double exact[3] = { 0 };
     for (size_t a = 0; a < o.count; a++) {
         double sum[3] = { 0 }, G[9] = { 0 };
@@ -55,8 +56,8 @@ static void algebra(const shape *s, double volume) {
             }
         }
         for (int i = 0; i < 3; i++) {
-            open = fmax(open, fabs(sum[i] + (double)o.boundary[3 * a + (size_t)i]) / area);
-            exact[i] += (long double)o.boundary[3 * a + (size_t)i]; /* the sum's own round-off is not asked for */
+            open = fmax(open, fabs(sum[i] + (double)areas[3 * o.host[a] + (size_t)i]) / area);
+            exact[i] += (long double)areas[3 * o.host[a] + (size_t)i]; /* the sum's own round-off is not asked for */
         }
         for (int i = 0; i < 9; i++) slope = fmax(slope, fabs(G[i] - (i % 4 == 0)));
         least = fmin(least, (double)o.volumes[a] / cell);
@@ -71,6 +72,7 @@ static void algebra(const shape *s, double volume) {
     for (int i = 0; i < 3; i++) B[i] = (double)exact[i];
     CHECK_BELOW(length3(B), 1e3 * EPSILON * area);
     free(X);
+    free(areas);
     scene_destroy(&body);
 }
 
