@@ -3675,7 +3675,7 @@ struct tlsph_solver {
     tlsph_real *damped_g;
     size_t images;
     struct tlsphi_image *image; /* TLSPH_CELLS_4: sorted by particle */
-    tlsph_real *X, *V, *tau;
+    tlsph_real *V, *tau;
     size_t areas;   /* particles with a boundary vector, */
     uint32_t *B_of; /* sorted, */
     tlsph_real *B;  /* D each; see tlsphi_boundary */
@@ -3746,6 +3746,13 @@ TLSPHI_INLINE void tlsphi_row_get(const tlsph_solver *s, int row, const int n, s
 TLSPHI_INLINE void tlsphi_row_put(const tlsph_solver *s, int row, const int n, size_t a, const tlsph_real *in) {
     tlsph_real *at = tlsphi_at(s, row, a);
     TLSPHI_UNROLL for (int i = 0; i < n; i++) at[(size_t)i * TLSPHI_ROW] = in[i];
+}
+/* Component of X_a, and d = X_b - X_a. */
+TLSPHI_INLINE tlsph_real tlsphi_X(const tlsph_solver *s, size_t a, size_t i) {
+    return tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW];
+}
+TLSPHI_INLINE void tlsphi_pair_arm(const tlsph_solver *s, size_t a, size_t b, const int dim, tlsph_real *d) {
+    TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) d[i] = tlsphi_X(s, b, i) - tlsphi_X(s, a, i);
 }
 /* Places of a field of tensors by tiles, and of the first component of particle a; the others follow TLSPHI_LANES
    apart. */
@@ -4739,16 +4746,20 @@ TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, siz
 TLSPHI_INLINE void tlsphi_take_turn(const tlsph_solver *s, const tlsphi_body *body, size_t base, size_t first,
                                     size_t last, const int dim, tlsph_real *G) {
     const size_t D = (size_t)dim, dd = D * D;
-    const tlsph_real *x = s->linear ? s->X : s->now.x, *v = tlsphi_at(s, s->rows.v, base);
+    const tlsph_real *v = tlsphi_at(s, s->rows.v, base);
     tlsph_real arm[3 * TLSPHI_LANES], unit[9 * TLSPHI_LANES], w[3 * TLSPHI_LANES];
     const tlsph_real *F = s->linear ? unit : s->now.F + dd * base;
     tlsph_real spin[3], mean[3], centre[3] = {0, 0, 0};
     for (size_t i = 0; i < 3; i++) {
         spin[i] = (tlsph_real)body->spin[i];
         mean[i] = (tlsph_real)body->v_mean[i];
-        if (i < D) centre[i] = (tlsph_real)((double)x[D * body->first + i] + body->centre[i]);
+        if (i >= D) continue;
+        const tlsph_real from = s->linear ? tlsphi_X(s, body->first, i) : s->now.x[D * body->first + i];
+        centre[i] = (tlsph_real)((double)from + body->centre[i]);
     }
-    tlsphi_take_lanes(x + D * base, D, first, last, arm);
+    if (!s->linear) tlsphi_take_lanes(s->now.x + D * base, D, first, last, arm);
+    for (size_t i = 0; s->linear && i < D; i++)
+        memcpy(arm + i * TLSPHI_LANES, tlsphi_at(s, s->rows.X, base) + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *arm);
     if (s->linear) tlsphi_clear_lanes(9, unit);
     for (size_t i = 0; s->linear && i < D; i++)
         for (size_t l = 0; l < TLSPHI_LANES; l++) unit[(D + 1) * i * TLSPHI_LANES + l] = 1;
@@ -5044,7 +5055,7 @@ TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int 
         const size_t b = s->neighbour[k];
         tlsph_real d[3], change[9], jump[3];
         tlsphi_tensor_get(s->grad_v, dd, b, change);
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
+        tlsphi_pair_arm(s, a, b, dim, d);
         TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] -= g_a[i];
         tlsphi_multiply(dim, change, d, jump);
         tlsphi_add_outer(dim, correction, jump, s->g + D * k);
@@ -5108,7 +5119,7 @@ static tlsph_real tlsphi_pair_laplacian(const tlsph_solver *s, size_t a, size_t 
     const size_t D = (size_t)dim;
     tlsph_real d[3] = {0}, C[3] = {0};
     tlsphi_skew_vector(s, a, b, dim, s->g + D * k, C);
-    for (size_t i = 0; i < D; i++) d[i] = s->X[D * b + i] - s->X[D * a + i];
+    tlsphi_pair_arm(s, a, b, dim, d);
     return tlsphi_max(tlsphi_dot(dim, C, d), 0) / tlsphi_dot(dim, d, d);
 }
 /* sum_c l_ac d_ac / (2 V_a^2), turned so that its product with g_ab is that with C_ab; r_ab goes with rest. */
@@ -5118,7 +5129,7 @@ static void tlsphi_laplacian_lean(const tlsph_solver *s, size_t a, tlsph_real le
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const size_t b = s->neighbour[k];
         const tlsph_real l = s->laplacian[k] / (2 * s->V[a] * s->V[a]);
-        for (size_t i = 0; i < D; i++) lean[i] += l * (s->X[D * b + i] - s->X[D * a + i]);
+        for (size_t i = 0; i < D; i++) lean[i] += l * (tlsphi_X(s, b, i) - tlsphi_X(s, a, i));
     }
     tlsphi_correct_transposed(s, a, s->dim, lean, turned);
 }
@@ -5766,7 +5777,7 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
     for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < 3; k++) {
             const size_t at = D * load->inner[i] + k;
-            load->X[3 * i + k] = k < D ? s->X[at] : 0;
+            load->X[3 * i + k] = k < D ? tlsphi_X(s, load->inner[i], k) : 0;
             load->x[3 * i + k] = k < D ? s->now.x[at] : 0;
             if (!load->part || k >= D) continue;
             tlsph_real F[9];
@@ -5788,7 +5799,7 @@ TLSPHI_INLINE void tlsphi_stage_position(const tlsph_solver *s, const tlsphi_sta
     const size_t D = (size_t)s->dim;
     X[2] = 0;
     for (size_t i = 0; i < D; i++)
-        X[i] = s->linear      ? (double)s->X[D * a + i]
+        X[i] = s->linear      ? (double)tlsphi_X(s, a, i)
                : stage->ahead ? tlsphi_next_position(s, stage, dt, D * a + i)
                               : (double)s->now.x[D * a + i];
 }
@@ -5798,7 +5809,7 @@ static void tlsphi_stage_arm(const tlsph_solver *s, const tlsphi_stage *stage, d
     const double rho = (double)tlsphi_material_of(s, a)->rho;
     z[2] = 0;
     for (size_t i = 0, at = D * a; i < D; i++, at++)
-        z[i] = s->linear ? stage->rate_weight * (double)s->X[at]
+        z[i] = s->linear ? stage->rate_weight * (double)tlsphi_X(s, a, i)
                          : stage->z_old * (double)s->old.x[at] +
                                stage->z_next * tlsphi_next_position(s, stage, dt, at) +
                                dt * (stage->z_was * (double)s->old.p[at] / rho + stage->z_is * (double)s->v[at]);
@@ -6134,7 +6145,9 @@ static void tlsphi_take_arms(const tlsphi_projection *p, const double origin[3],
         memset(v, 0, sizeof v);
     }
     for (size_t a = begin; a < end; a++) out->V[a - base] = (double)s->V[a];
-    tlsphi_take_vectors(s->linear ? s->X : s->now.x, s->dim, begin, end, out->X);
+    if (!s->linear) tlsphi_take_vectors(s->now.x, s->dim, begin, end, out->X);
+    for (size_t i = 0; s->linear && i < (size_t)s->dim; i++)
+        for (size_t a = begin; a < end; a++) out->X[i][a - base] = (double)tlsphi_X(s, a, i);
     if (ahead) tlsphi_take_vectors(s->old.x, s->dim, begin, end, was);
     if (ahead) tlsphi_take_vectors(s->v, s->dim, begin, end, v);
     for (int i = 0; i < s->dim; i++) {
@@ -6461,9 +6474,9 @@ static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
 /* k_ab of R */
 TLSPHI_INLINE tlsph_real tlsphi_pressure_pair(const tlsph_solver *s, size_t a, size_t b, const tlsph_real *g,
                                               const int dim, tlsph_real *d) {
-    const size_t D = (size_t)dim, dd = D * D;
+    const size_t dd = (size_t)(dim * dim);
     tlsph_real c[3], C[3];
-    TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = s->X[D * b + (size_t)i] - s->X[D * a + (size_t)i];
+    tlsphi_pair_arm(s, a, b, dim, d);
     tlsphi_multiply_mean(dim, s->pressure.A + dd * a, s->pressure.A + dd * b, g, c);
     tlsphi_skew_vector(s, a, b, dim, g, C);
     const tlsph_real Cd = tlsphi_dot(dim, C, d), rho = (tlsphi_material_of(s, a)->rho + tlsphi_material_of(s, b)->rho) / 2;
@@ -7412,7 +7425,9 @@ static void tlsphi_run_level(tlsph_solver *s, tlsphi_block_fn fn, int which) {
 }
 /* Where the pass sees a particle; linear elasticity takes moments about X. */
 static void tlsphi_pass_position(const tlsph_solver *s, size_t a, double x[3]) {
-    tlsphi_vector3((s->linear ? s->X : s->now.x) + (size_t)s->dim * a, s->dim, x);
+    tlsph_real X[3];
+    tlsphi_row_get(s, s->rows.X, s->dim, a, X);
+    tlsphi_vector3(s->linear ? X : s->now.x + (size_t)s->dim * a, s->dim, x);
 }
 /* Moves x to the time of the pass. The rows of v become mean velocities since the level was moved last, those of w the
    same without the rigid motion that the body had when the step began, seen from the middle of that time. */
@@ -7787,7 +7802,7 @@ static void tlsphi_ledger_particle(const tlsph_solver *s, size_t a, tlsph_ledger
     for (size_t i = 0; i < D; i++) {
         x[i] = (double)s->now.x[D * a + i];
         p[i] = V * (double)s->now.p[D * a + i];
-        arm[i] = s->linear ? (double)s->X[D * a + i] : x[i];
+        arm[i] = s->linear ? (double)tlsphi_X(s, a, i) : x[i];
     }
     tlsphi_cross3(arm, p, xp);
     out->mass += V * (double)m->rho;
@@ -7925,11 +7940,14 @@ static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field
     const tlsph_real rho = tlsphi_material_of(s, a)->rho;
     tlsph_real G[9];
     switch (field) {
-    case TLSPH_FIELD_REFERENCE_POSITION: tlsphi_out_vector(dim, s->X + D * a, 1, out); return 1;
+    case TLSPH_FIELD_REFERENCE_POSITION:
+        tlsphi_row_get(s, s->rows.X, dim, a, G);
+        tlsphi_out_vector(dim, G, 1, out);
+        return 1;
     case TLSPH_FIELD_POSITION: tlsphi_out_vector(dim, s->now.x + D * a, 1, out); return 1;
     case TLSPH_FIELD_DISPLACEMENT:
         tlsphi_out_vector(dim, s->now.x + D * a, 1, out);
-        for (size_t i = 0; i < D; i++) out[i] -= s->X[D * a + i];
+        for (size_t i = 0; i < D; i++) out[i] -= tlsphi_X(s, a, i);
         return 1;
     case TLSPH_FIELD_VELOCITY: tlsphi_out_vector(dim, s->now.p + D * a, 1 / rho, out); return 1;
     case TLSPH_FIELD_MOMENTUM: tlsphi_out_vector(dim, s->now.p + D * a, 1, out); return 1;
@@ -9116,7 +9134,6 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->body = TLSPHI_TAKE(arena, tlsphi_body, s->bodies);
     s->host = TLSPHI_TAKE(arena, uint32_t, n);
     s->inner = TLSPHI_TAKE(arena, uint32_t, n);
-    s->X = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->V = TLSPHI_TAKE(arena, tlsph_real, n);
     s->areas = plan->areas;
     s->B_of = TLSPHI_TAKE(arena, uint32_t, s->areas);
@@ -9188,8 +9205,8 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
         if (s->material_of)
             s->material_of[a] = plan->desc->particles.materials ? plan->desc->particles.materials[h] : 0;
         for (size_t i = 0; i < D; i++) {
-            s->X[D * a + i] = s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
-            tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW] = s->X[D * a + i];
+            s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
+            tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW] = s->now.x[D * a + i];
             s->now.F[tlsphi_tensor_at(D * D, a) + (D + 1) * i * TLSPHI_LANES] = 1;
             if (s->has_H) s->now.H[tlsphi_tensor_at(D * D, a) + (D + 1) * i * TLSPHI_LANES] = 1;
         }
@@ -9484,8 +9501,10 @@ static uint64_t tlsphi_fingerprint(const tlsph_solver *s) {
                                       (unsigned char)s->incompressible};
     uint64_t h = tlsphi_hash(0xcbf29ce484222325u, options, sizeof options);
     for (size_t i = 0; i < s->n; i++) {
-        const size_t a = s->inner[i], D = (size_t)s->dim;
-        h = tlsphi_hash_reals(h, s->X + D * a, D);
+        const size_t a = s->inner[i];
+        tlsph_real X[3];
+        tlsphi_row_get(s, s->rows.X, s->dim, a, X);
+        h = tlsphi_hash_reals(h, X, (size_t)s->dim);
         h = tlsphi_hash_reals(h, s->V + a, 1);
         if (s->material_of) h = tlsphi_hash(h, s->material_of + a, 1);
     }
@@ -11376,8 +11395,8 @@ static double tlsphi_survey_bodies(const tlsph_solver *s, tlsph_preflight_report
         for (size_t k = 0; k < D; k++) {
             double low = TLSPHI_LARGEST, high = -TLSPHI_LARGEST;
             for (size_t a = begin; a < end; a++) {
-                low = tlsphi_dmin(low, (double)s->X[D * a + k]);
-                high = tlsphi_dmax(high, (double)s->X[D * a + k]);
+                low = tlsphi_dmin(low, (double)tlsphi_X(s, a, k));
+                high = tlsphi_dmax(high, (double)tlsphi_X(s, a, k));
             }
             thin = tlsphi_dmin(thin, high - low);
             longest = tlsphi_dmax(longest, high - low);
