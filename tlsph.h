@@ -3621,8 +3621,9 @@ typedef struct tlsphi_image {
 /* Conduction in stages of its own, see [SUPER-STEPS]: temperatures at the beginning, of the last two stages, rates at the
    beginning and of heat loads, and E before the step. */
 typedef struct tlsphi_super {
-    int most; /* stages a half step; 0: off, no arrays */
+    int most, fresh; /* stages a half step, 0: off, no arrays; is this one the first? */
     tlsph_real *first, *previous, *current, *rate, *source, *E;
+    tlsph_real *conductance; /* of each pair, by slots; NULL where the form is not the compact one */
 } tlsphi_super;
 
 /* See [MULTI-RATE]. */
@@ -4794,6 +4795,15 @@ TLSPHI_INLINE void tlsphi_heat_flux_lanes(const tlsph_solver *s, size_t base, co
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) heat[(size_t)i * TLSPHI_LANES + l] = factor * out[i];
     }
 }
+/* The raw sums of theta become its slopes and the heat fluxes. */
+TLSPHI_INLINE void tlsphi_store_theta(const tlsph_solver *s, size_t base, size_t first, size_t last, const int dim,
+                                      const tlsph_real *scale, const tlsph_real *M, tlsph_real *sum) {
+    tlsph_real heat[3 * TLSPHI_LANES];
+    tlsphi_heat_flux_lanes(s, base, dim, scale, sum, heat);
+    tlsphi_store_rows(dim, heat, first, last, tlsphi_at(s, s->rows.heat, base));
+    tlsphi_finish_gradients(scale, M, dim, 1, sum);
+    tlsphi_store_rows(dim, sum, first, last, tlsphi_at(s, s->rows.slope_theta, base));
+}
 /* What becomes of the raw sums of the particles [begin, end) of a tile. E without its kinetic part changes by P : grad w
    (see [PROJECTION]), J by H : grad v; PM : (raw sum) and HM : (raw sum) are the same, and adjoint to T_a. */
 TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block *block, size_t begin, size_t end,
@@ -4802,7 +4812,6 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     const int dd = dim * dim;
     const tlsph_real *M = s->M ? tlsphi_correction_lanes(s, base) : NULL;
     tlsph_real *row = tlsphi_at(s, 0, base), scale[TLSPHI_LANES] = {0}, rate[TLSPHI_LANES];
-    tlsph_real heat[3 * TLSPHI_LANES];
     for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
     tlsph_real *const w = with_w ? sum->w : sum->v;
     if (s->rate_E) {
@@ -4822,12 +4831,7 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
         tlsphi_finish_gradients(scale, M, dim, 1, sum->S);
         tlsphi_store_rows(dim, sum->S, first, last, row + (size_t)s->rows.slope_S * TLSPHI_ROW);
     }
-    if (with_theta) {
-        tlsphi_heat_flux_lanes(s, base, dim, scale, sum->theta, heat);
-        tlsphi_store_rows(dim, heat, first, last, row + (size_t)s->rows.heat * TLSPHI_ROW);
-        tlsphi_finish_gradients(scale, M, dim, 1, sum->theta);
-        tlsphi_store_rows(dim, sum->theta, first, last, row + (size_t)s->rows.slope_theta * TLSPHI_ROW);
-    }
+    if (with_theta) tlsphi_store_theta(s, base, first, last, dim, scale, M, sum->theta);
 }
 TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin,
                                         size_t end, const int dim, int with_w, int with_S, int with_theta) {
@@ -4886,10 +4890,20 @@ static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
     for (size_t i = 0; i < dd; i++) tlsphi_at(s, r->grad_w, a)[i * TLSPHI_ROW] += Gw[i];
 }
 
+/* The slope of Sigma_J or, heat, of theta. */
+static void tlsphi_mirror_slope(tlsph_solver *s, int row, int heat, size_t a) {
+    tlsph_real slope[3];
+    tlsphi_row_get(s, row, s->dim, a, slope);
+    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
+        if (!m->tangent && !(heat && m->conducts)) tlsphi_mirror_vector(s->dim, m, slope);
+    tlsphi_row_put(s, row, s->dim, a, slope);
+}
 static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     const int dim = s->dim, dd = dim * dim;
     const tlsphi_rows *r = &s->rows;
-    tlsph_real Gw[9], slope[3];
+    tlsph_real Gw[9];
+    if (s->has_J) tlsphi_mirror_slope(s, r->slope_S, 0, a);
+    if (s->conducts) tlsphi_mirror_slope(s, r->slope_theta, 1, a);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
         if (s->grad_v) {
             tlsphi_tensor_get(s->grad_v, dd, a, Gw);
@@ -4899,13 +4913,6 @@ static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
         tlsphi_row_get(s, r->grad_w, dd, a, Gw);
         tlsphi_mirror_tensor(dim, m, Gw);
         tlsphi_row_put(s, r->grad_w, dd, a, Gw);
-        for (int i = 0; i < 2; i++) {
-            const int row = i ? r->slope_theta : r->slope_S;
-            if (m->tangent || !(i ? s->conducts && !m->conducts : s->has_J)) continue;
-            tlsphi_row_get(s, row, dim, a, slope);
-            tlsphi_mirror_vector(dim, m, slope);
-            tlsphi_row_put(s, row, dim, a, slope);
-        }
     }
 }
 
@@ -5301,21 +5308,25 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
    on lattices h/J |c|^2/(C.d), which is unbounded in clouds, where C may be nearly perpendicular to d.
    Where one neighbour is more than twice as hot as the other, the products Q_a theta_b/theta_a of the double gradient are
    larger than any flux, and unstable; there the two-point flux stands alone. */
-/* C.d, by two sides */
-TLSPHI_INLINE tlsph_real tlsphi_along(const tlsphi_heat_side *a, const tlsphi_heat_side *b, const tlsph_real *C,
-                                      const int dim) {
-    tlsph_real d[3] = {0};
+/* k with CC = |C|^2; along: C.d, or NULL where C is at hand. */
+TLSPHI_INLINE tlsph_real tlsphi_conductance(const tlsphi_heat_side *a, const tlsphi_heat_side *b,
+                                            const tlsph_real *g, tlsph_real CC, const tlsph_real *C,
+                                            const tlsph_real *along, const int dim) {
+    tlsph_real d[3] = {0}, c_a[3] = {0}, c_b[3] = {0};
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = b->X[i] - a->X[i];
-    return tlsphi_dot(dim, C, d);
+    const tlsph_real Cd = tlsphi_max(along ? *along : tlsphi_dot(dim, C, d), 0);
+    tlsphi_multiply(dim, a->A, g, c_a);
+    tlsphi_multiply(dim, b->A, g, c_b);
+    return (a->h_J * tlsphi_dot(dim, c_a, c_a) + b->h_J * tlsphi_dot(dim, c_b, c_b)) * Cd *
+           tlsphi_inverse_or_0(2 * CC * tlsphi_dot(dim, d, d));
 }
-/* CC = |C|^2, along = C.d */
 typedef struct tlsphi_pair_of_heat {
     tlsph_real heat, source, conduction;
 } tlsphi_pair_of_heat;
 
 TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat_side *b, const tlsph_real *g,
-                                    tlsph_real CC, tlsph_real along, const tlsph_real *rest, const int dim,
-                                    int thermal, const int compact, tlsphi_pair_of_heat *out) {
+                                    tlsph_real k, const tlsph_real *rest, const int dim, int thermal, const int compact,
+                                    tlsphi_pair_of_heat *out) {
     tlsph_real q_a = tlsphi_dot(dim, a->heat, g), q_b = tlsphi_dot(dim, b->heat, g);
     if (rest) {
         q_a += tlsphi_dot(dim, a->heat, rest);
@@ -5329,15 +5340,10 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat
     out->heat = -(q_a * (thermal == TLSPH_ENERGY ? b->theta : one) + q_b * (thermal == TLSPH_ENERGY ? a->theta : one)) / 2;
     out->conduction = 0;
     if (!compact) return;
-    tlsph_real d[3] = {0}, c_a[3] = {0}, c_b[3] = {0};
+    tlsph_real d[3] = {0};
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) d[i] = b->X[i] - a->X[i];
-    const tlsph_real Cd = tlsphi_max(along, 0);
     const tlsph_real slope = (tlsphi_dot(dim, a->slope, d) + tlsphi_dot(dim, b->slope, d)) / 2;
     const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = front ? D_theta : limited;
-    tlsphi_multiply(dim, a->A, g, c_a);
-    tlsphi_multiply(dim, b->A, g, c_b);
-    const tlsph_real k = (a->h_J * tlsphi_dot(dim, c_a, c_a) + b->h_J * tlsphi_dot(dim, c_b, c_b)) * Cd *
-                         tlsphi_inverse_or_0(2 * CC * tlsphi_dot(dim, d, d));
     const tlsph_real into = k * jump;
     out->heat += into / (thermal == TLSPH_ENERGY ? one : a->theta);
     out->conduction = into * D_theta * tlsphi_inverse_or_0(2 * a->theta * b->theta);
@@ -5353,6 +5359,20 @@ static double tlsphi_audit(int dim, const tlsphi_damp_side *a, const tlsphi_damp
 /* -- the pairs of a particle, one by one -- */
 
 /* Stresses, and heat, of one pair. */
+TLSPHI_INLINE void tlsphi_add_heat(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *C, const int dim,
+                                   int thermal, tlsphi_gathered *sum) {
+    const tlsph_real *g = s->g + (size_t)dim * k;
+    const tlsph_real *rest = s->rest && s->force_form == TLSPH_ADJOINT ? s->rest + (size_t)dim * k : NULL;
+    tlsphi_heat_side side_a, side_b;
+    tlsphi_pair_of_heat heat;
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, &side_a);
+    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, s->neighbour[k]), TLSPHI_ROW, dim, &side_b);
+    const tlsph_real conductance = tlsphi_conductance(&side_a, &side_b, g, tlsphi_dot(dim, C, C), C, NULL, dim);
+    tlsphi_pair_heat(&side_a, &side_b, g, conductance, rest, dim, thermal, s->conduction == TLSPH_COMPACT, &heat);
+    sum->heat += heat.heat;
+    sum->source += heat.source;
+    sum->conduction += heat.conduction;
+}
 TLSPHI_INLINE void tlsphi_add_stress(const tlsph_solver *s, size_t a, size_t k, const tlsph_real *C, const int dim,
                                      tlsphi_gathered *sum) {
     const int dd = dim * dim;
@@ -5368,16 +5388,7 @@ TLSPHI_INLINE void tlsphi_add_stress(const tlsph_solver *s, size_t a, size_t k, 
         tlsphi_multiply(dim, P_a, rest, t);
         for (int i = 0; i < dim; i++) sum->T[i] += t[i];
     }
-    if (!s->heat_moves) return;
-    tlsphi_heat_side side_a, side_b;
-    tlsphi_pair_of_heat heat;
-    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, &side_a);
-    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), TLSPHI_ROW, dim, &side_b);
-    tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
-                     s->thermal, s->conduction == TLSPH_COMPACT, &heat);
-    sum->heat += heat.heat;
-    sum->source += heat.source;
-    sum->conduction += heat.conduction;
+    if (s->heat_moves) tlsphi_add_heat(s, a, k, C, dim, s->thermal, sum);
 }
 /* Dissipation of the pair k of s->g, or of s->damped_g. */
 TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t b, size_t k, const tlsph_real *g,
@@ -5408,19 +5419,20 @@ TLSPHI_INLINE void tlsphi_add_damping_of(const tlsph_solver *s, size_t a, size_t
     if (s->audit) sum->least = tlsphi_dmin(sum->least, tlsphi_audit(dim, &side_a, &side_b, &flux));
 }
 /* parts: TLSPHI_STRESSES (and heat) or TLSPHI_DAMPING or both; apart only where the dissipation is frozen or has pairs of
-   its own. */
-enum { TLSPHI_STRESSES = 1, TLSPHI_DAMPING = 2, TLSPHI_BOTH = 3 };
+   its own. TLSPHI_HEAT: that of the E form alone, see [SUPER-STEPS]. */
+enum { TLSPHI_STRESSES = 1, TLSPHI_DAMPING = 2, TLSPHI_BOTH = 3, TLSPHI_HEAT = 4 };
 TLSPHI_INLINE void tlsphi_flux_pairs(const tlsph_solver *s, size_t a, int parts, const int dim, tlsphi_gathered *sum) {
     const size_t D = (size_t)dim, *first = parts == TLSPHI_DAMPING ? s->damped_first : s->first;
     const uint32_t *neighbour = parts == TLSPHI_DAMPING ? s->damped_neighbour : s->neighbour;
     const tlsph_real *vectors = parts == TLSPHI_DAMPING ? s->damped_g : s->g;
-    if (s->dissipation == TLSPH_NO_DISSIPATION) parts &= TLSPHI_STRESSES;
+    if (s->dissipation == TLSPH_NO_DISSIPATION) parts &= ~TLSPHI_DAMPING;
     for (size_t k = first[a]; k < first[a + 1]; k++) {
         const size_t b = neighbour[k];
         const tlsph_real *g = vectors + D * k;
         tlsph_real C[3];
         tlsphi_skew_vector(s, a, b, dim, g, C);
         if (parts & TLSPHI_STRESSES) tlsphi_add_stress(s, a, k, C, dim, sum);
+        if (parts & TLSPHI_HEAT) tlsphi_add_heat(s, a, k, C, dim, TLSPH_ENERGY, sum);
         if (parts & TLSPHI_DAMPING) tlsphi_add_damping_of(s, a, b, k, g, C, dim, sum);
     }
 }
@@ -5465,13 +5477,13 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_heat_side side_a, side_b;
         tlsphi_pair_of_heat heat;
-        tlsph_real g[3];
+        tlsph_real g[5];
         tlsphi_load_heat(r, a + l, TLSPHI_LANES, dim, &side_a);
         tlsphi_load_heat(r, b + l, TLSPHI_ROW, dim, &side_b);
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) g[i] = pattern[(size_t)i * TLSPHI_LANES + l];
-        const tlsph_real C = pattern[(size_t)dim * TLSPHI_LANES + l];
-        const tlsph_real along = given ? pattern[(size_t)(dim + 1) * TLSPHI_LANES + l] : tlsphi_along(&side_a, &side_b, g, dim);
-        tlsphi_pair_heat(&side_a, &side_b, g, C * C, along, NULL, dim, thermal, compact, &heat);
+        tlsphi_take_apart(dim + 1 + given, pattern + l, TLSPHI_LANES, g);
+        const tlsph_real CC = g[dim] * g[dim], *along = given ? g + dim + 1 : NULL;
+        const tlsph_real k = compact ? tlsphi_conductance(&side_a, &side_b, g, CC, g, along, dim) : 0;
+        tlsphi_pair_heat(&side_a, &side_b, g, k, NULL, dim, thermal, compact, &heat);
         sum->heat[l] += heat.heat;
         sum->source[l] += heat.source;
         sum->conduction[l] += heat.conduction;
@@ -6813,79 +6825,117 @@ static double tlsphi_heat_step(const tlsph_solver *s) {
     return dt;
 }
 
-TLSPHI_INLINE void tlsphi_theta_gradient(tlsph_solver *s, size_t a, const int dim) {
-    const size_t D = (size_t)dim;
+TLSPHI_INLINE void tlsphi_theta_gradient_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile,
+                                              size_t begin, size_t end, const int dim) {
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
+    const tlsph_real *a = tlsphi_theta(s, base);
+    const int theta = s->rows.theta;
+    tlsph_real sum[3 * TLSPHI_LANES], scale[TLSPHI_LANES] = {0};
+    tlsphi_clear_lanes(dim, sum);
+    for (size_t k = s->graph.first[tile]; k < s->graph.first[tile + 1]; k++) {
+        const tlsphi_slot *slot = s->graph.slot + k;
+        const tlsph_real *g = s->graph.pattern + (size_t)slot->pattern * (size_t)s->graph.width * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, &s->graph, slot, theta, theta + 1);
+        tlsphi_gradient_rows(a, b + theta * TLSPHI_ROW, g, dim, 1, sum);
+    }
+    for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
+    tlsphi_store_theta(s, base, first, last, dim, scale, s->M ? tlsphi_correction_lanes(s, base) : NULL, sum);
+}
+/* One by one: with bonds, at mirrors, and to compare (`audit`). */
+static void tlsphi_theta_gradient(tlsph_solver *s, size_t a) {
+    const size_t D = (size_t)s->dim;
     const tlsph_real half = 1 / (2 * s->V[a]);
     tlsph_real grad[3] = {0, 0, 0}, slope[3];
     for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
         const tlsph_real jump = (*tlsphi_theta(s, s->neighbour[k]) - *tlsphi_theta(s, a)) * half;
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) grad[i] += jump * s->g[D * k + (size_t)i];
+        for (size_t i = D * k; i < D * k + D; i++) grad[i - D * k] += jump * (s->g[i] + (s->rest ? s->rest[i] : 0));
     }
-    tlsphi_correct_vector(s, a, dim, grad, slope);
-    for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
-        if (!m->tangent && !m->conducts) tlsphi_mirror_vector(dim, m, slope);
-    tlsphi_row_put(s, s->rows.slope_theta, dim, a, slope);
-    tlsphi_heat_flux(s, a);
+    tlsphi_correct_vector(s, a, s->dim, grad, slope);
+    tlsphi_row_put(s, s->rows.slope_theta, s->dim, a, slope);
 }
 static void tlsphi_theta_gradient_block(tlsph_solver *s, tlsphi_block *block) {
-    for (size_t a = block->begin; a < block->end; a++) {
-        if (s->dim == 3) tlsphi_theta_gradient(s, a, 3);
-        else tlsphi_theta_gradient(s, a, 2);
+    const int one_by_one = s->audit || s->bonds;
+    for (size_t a = block->begin, tile = block->tile, end; a < block->end && !one_by_one; a = end, tile++) {
+        end = tlsphi_tile_end(block, a);
+        if (s->dim == 3) tlsphi_theta_gradient_tile(s, block, tile, a, end, 3);
+        else tlsphi_theta_gradient_tile(s, block, tile, a, end, 2);
+    }
+    for (size_t a = block->begin; (s->mirrors || one_by_one) && a < block->end; a++) {
+        if (one_by_one) tlsphi_theta_gradient(s, a);
+        if (!one_by_one && !tlsphi_mirrors_of(s, a)) continue;
+        tlsphi_mirror_slope(s, s->rows.slope_theta, 1, a);
+        tlsphi_heat_flux(s, a);
+    }
+}
+/* Heat that the pairs of a slot bring. As deformation rests meanwhile, the first stage of a super-step keeps the
+   conductances k for the others. */
+TLSPHI_INLINE void tlsphi_theta_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                      const tlsph_real *pattern, const int dim, const int compact, const int fresh,
+                                      const int given, tlsph_real *k, tlsph_real *sum) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsphi_heat_side side_a, side_b;
+        tlsphi_pair_of_heat heat;
+        tlsph_real g[5];
+        tlsphi_load_heat(r, a + l, TLSPHI_ROW, dim, &side_a);
+        tlsphi_load_heat(r, b + l, TLSPHI_ROW, dim, &side_b);
+        tlsphi_take_apart(dim + 1 + given, pattern + l, TLSPHI_LANES, g);
+        const tlsph_real CC = g[dim] * g[dim], *along = given ? g + dim + 1 : NULL;
+        if (fresh) k[l] = tlsphi_conductance(&side_a, &side_b, g, CC, g, along, dim);
+        tlsphi_pair_heat(&side_a, &side_b, g, compact ? k[l] : 0, NULL, dim, TLSPH_ENERGY, compact, &heat);
+        sum[l] += heat.heat;
+    }
+}
+TLSPHI_INLINE void tlsphi_theta_rate_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile,
+                                          const tlsph_real *a, const int dim, const int has_J, tlsph_real *sum) {
+    const tlsphi_rows r = tlsphi_rows_of(dim, has_J, 1, 1, 0);
+    for (size_t at = s->graph.first[tile]; at < s->graph.first[tile + 1]; at++) {
+        const tlsphi_slot *slot = s->graph.slot + at;
+        const tlsph_real *g = s->graph.pattern + (size_t)slot->pattern * (size_t)s->graph.width * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, &s->graph, slot, r.theta, s->super.fresh ? r.count : r.h_J);
+        tlsph_real *k = s->super.conductance + at * TLSPHI_LANES;
+        if (slot->scattered) tlsphi_gather(s, block, &s->graph, slot, r.X, r.X + dim);
+        if (slot->scattered && s->super.fresh) tlsphi_gather(s, block, &s->graph, slot, r.A, r.slope_w);
+        if (s->conduction != TLSPH_COMPACT) tlsphi_theta_lanes(&r, a, b, g, dim, 0, 0, 0, NULL, sum);
+        else if (!s->super.fresh) tlsphi_theta_lanes(&r, a, b, g, dim, 1, 0, 0, k, sum);
+        else if (s->M) tlsphi_theta_lanes(&r, a, b, g, dim, 1, 1, 1, k, sum);
+        else tlsphi_theta_lanes(&r, a, b, g, dim, 1, 1, 0, k, sum);
     }
 }
 /* rate_E becomes d theta/dt, K/s. */
-TLSPHI_INLINE void tlsphi_theta_rate(tlsph_solver *s, size_t a, const int dim) {
-    const size_t D = (size_t)dim;
-    tlsphi_heat_side side_a, side_b;
-    tlsphi_pair_of_heat sum, heat;
-    memset(&sum, 0, sizeof sum);
-    tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, a), TLSPHI_ROW, dim, &side_a);
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const size_t b = s->neighbour[k];
-        const tlsph_real *g = s->g + D * k;
-        const tlsph_real *rest = s->rest && s->force_form == TLSPH_ADJOINT ? s->rest + D * k : NULL;
-        tlsph_real C[3];
-        tlsphi_skew_vector(s, a, b, dim, g, C);
-        tlsphi_load_heat(&s->rows, tlsphi_at(s, 0, b), TLSPHI_ROW, dim, &side_b);
-        tlsphi_pair_heat(&side_a, &side_b, g, tlsphi_dot(dim, C, C), tlsphi_along(&side_a, &side_b, C, dim), rest, dim,
-                         TLSPH_ENERGY, s->conduction == TLSPH_COMPACT, &heat);
-        sum.heat += heat.heat;
-        sum.source += heat.source;
-        sum.conduction += heat.conduction;
-    }
-    s->rate_E[a] = sum.heat / (s->V[a] * tlsphi_material_of(s, a)->c_v) + s->super.source[a];
-}
 static void tlsphi_theta_rate_block(tlsph_solver *s, tlsphi_block *block) {
-    for (size_t a = block->begin; a < block->end; a++) {
-        if (s->dim == 3) tlsphi_theta_rate(s, a, 3);
-        else tlsphi_theta_rate(s, a, 2);
+    tlsphi_gathered pairs[TLSPHI_LANES];
+    for (size_t a = block->begin, tile = block->tile, end; a < block->end; a = end, tile++) {
+        const size_t base = a / TLSPHI_LANES * TLSPHI_LANES;
+        const tlsph_real *row = tlsphi_at(s, 0, base);
+        tlsph_real sum[TLSPHI_LANES] = {0};
+        end = tlsphi_tile_end(block, a);
+        if (s->audit || s->bonds) {
+            tlsphi_flux_one_by_one(s, a, end, TLSPHI_HEAT, pairs);
+            for (size_t p = a; p < end; p++) sum[p - base] = pairs[p - a].heat;
+        } else if (s->dim == 3 && s->has_J) tlsphi_theta_rate_tile(s, block, tile, row, 3, 1, sum);
+        else if (s->dim == 3) tlsphi_theta_rate_tile(s, block, tile, row, 3, 0, sum);
+        else if (s->has_J) tlsphi_theta_rate_tile(s, block, tile, row, 2, 1, sum);
+        else tlsphi_theta_rate_tile(s, block, tile, row, 2, 0, sum);
+        for (size_t p = a; p < end; p++)
+            s->rate_E[p] = sum[p - base] / (s->V[p] * tlsphi_material_of(s, p)->c_v) + s->super.source[p];
     }
 }
 
-/* Rates of all heat loads, at the middle of the super-step. */
-static void tlsphi_super_loads(tlsph_solver *s, double time, double dt) {
-    memset(s->super.source, 0, s->n * sizeof *s->super.source);
+/* Rates of all heat loads, at the middle of the super-step; `after` it the entropy that came with them, at mean
+   temperatures. */
+static double tlsphi_super_loads(tlsph_solver *s, double time, double dt, int after) {
+    double entropy = 0;
+    if (!after) memset(s->super.source, 0, s->n * sizeof *s->super.source);
     for (size_t k = 0; k < s->loads; k++) {
         tlsphi_load *load = s->load + k;
         if (load->given.kind != TLSPH_HEAT_FLUX && load->given.kind != TLSPH_HEAT_SOURCE) continue;
-        tlsphi_load_values(s, load, time + dt / 2);
+        if (!after) tlsphi_load_values(s, load, time + dt / 2);
         for (size_t i = 0; i < load->given.count; i++) {
             const size_t a = load->inner[i];
             const tlsph_real power = tlsphi_heat_power(s, load, i);
-            s->super.source[a] += power / (s->V[a] * tlsphi_material_of(s, a)->c_v);
-            s->account.external_heat += dt * (double)power;
-        }
-    }
-}
-/* The entropy that came with them, at mean temperatures. */
-static double tlsphi_super_load_entropy(const tlsph_solver *s, double dt) {
-    double entropy = 0;
-    for (size_t k = 0; k < s->loads; k++) {
-        const tlsphi_load *load = s->load + k;
-        if (load->given.kind != TLSPH_HEAT_FLUX && load->given.kind != TLSPH_HEAT_SOURCE) continue;
-        for (size_t i = 0; i < load->given.count; i++) {
-            const size_t a = load->inner[i];
-            entropy += 2 * dt * (double)(tlsphi_heat_power(s, load, i) / (s->super.first[a] + s->super.current[a]));
+            if (after) entropy += 2 * dt * (double)(power / (s->super.first[a] + s->super.current[a]));
+            else s->super.source[a] += power / (s->V[a] * tlsphi_material_of(s, a)->c_v);
+            if (!after) s->account.external_heat += dt * (double)power;
         }
     }
     return entropy;
@@ -6965,18 +7015,19 @@ static void tlsphi_super_finish(tlsph_solver *s, tlsphi_block *block) {
 static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double dt) {
     int m = 3;
     double entropy = 0, made = 0;
-    tlsphi_super_loads(s, time, dt);
+    tlsphi_super_loads(s, time, dt, 0);
     while (tlsphi_super_reach(m) * tlsphi_heat_step(s) < dt * (1 - 1e-9) && m < s->super.most) m += 2;
     for (int j = 1; j <= m; j++) {
         tlsphi_super_stage stage = tlsphi_super_weights(s, j, m, dt);
         const double reached = j > 1 ? tlsphi_super_reach(j) / tlsphi_super_reach(m) : 1 / (3 * tlsphi_super_reach(m));
+        s->super.fresh = j == 1;
         tlsphi_run(s, tlsphi_theta_gradient_block);
         tlsphi_run(s, tlsphi_theta_rate_block);
         tlsphi_run_tasks(s, tlsphi_super_task, &stage);
         entropy += tlsphi_super_hold(s, time + reached * dt, j == m);
     }
     tlsphi_run(s, tlsphi_super_finish);
-    entropy += tlsphi_super_load_entropy(s, dt);
+    entropy += tlsphi_super_loads(s, time, dt, 1);
     for (size_t i = 0; i < s->blocks; i++) made += s->block[i].sums[TLSPHI_SUM_CONDUCTION_ENTROPY];
     s->account.external_entropy += entropy;
     s->account.conduction_entropy += made - entropy;
@@ -9016,7 +9067,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
     s->keeps_pairs = d->keep_pairs || !s->lanes || s->sharp || s->incompressible || d->particles.moments ||
-                     s->step_rule != TLSPH_STEP_BY_PARTICLE || (s->conducts && d->conduction_stages);
+                     s->step_rule != TLSPH_STEP_BY_PARTICLE;
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) s->loads += tlsphi_is_constraint(d->conditions[i].kind) ? 0 : 1;
 }
@@ -9162,6 +9213,8 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
     tlsphi_layout_graph(arena, plan->graph, &s->graph);
+    if (s->super.most && s->conduction == TLSPH_COMPACT && !s->bonds)
+        s->super.conductance = TLSPHI_TAKE(arena, tlsph_real, TLSPHI_LANES * plan->graph->slots);
     if (plan->lattice) tlsphi_layout_graph(arena, plan->graph + 1, &s->damped_graph);
     else s->damped_graph = s->graph;
     s->size.bytes_per_pair = (arena->used - before_pairs - (n + 1) * sizeof(size_t)) / (s->pairs ? s->pairs : 1);
