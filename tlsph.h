@@ -610,9 +610,9 @@ typedef struct tlsph_cloud {
 typedef struct tlsph_operator {
     size_t count, pairs;
     int dimension, corrected;      /* 1: M_a by tlsph_correction_read, 0: M_a = I */
-    const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1 */
-    const uint32_t *neighbours;    /* b, solver's order; NULL where desc.keep_pairs is 0 */
-    const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric; NULL like these */
+    const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1; NULL where pairs are */
+    const uint32_t *neighbours;    /* not kept (see desc.keep_pairs), like these: b, solver's order; */
+    const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric */
     const tlsph_real *rests;       /* r_ab, `dimension` each, or NULL */
     const tlsph_real *volumes;     /* V_a */
     const tlsph_real *spacing;     /* tau_a, the length that the time step sees */
@@ -1441,9 +1441,9 @@ static void tlsphi_grid_hash(tlsphi_grid *grid) {
 
 /* Pairs by tiles of TLSPHI_LANES particles: a slot is one neighbour for each lane. */
 typedef struct tlsphi_slot {
-    uint32_t pattern; /* which of the tile patterns: C_ab (D lanes each) and |C_ab|, 0 where a lane has no pair */
-    uint32_t from;    /* first of the neighbours side by side, or where the lanes' neighbours begin in `gathered` */
-    uint32_t scattered;
+    unsigned pattern : 28; /* which of the tile patterns: C_ab (D lanes each) and |C_ab|, 0 where a lane has no pair */
+    unsigned scattered : 1;
+    uint32_t from; /* first of the neighbours side by side, or where the lanes' neighbours begin in `gathered` */
 } tlsphi_slot;
 /* Different sets of numbers, each of which is stored once. */
 typedef struct tlsphi_patterns {
@@ -3666,8 +3666,9 @@ struct tlsph_solver {
     uint8_t *material_of; /* NULL: one material */
     tlsph_real *beside; /* 2 a particle, NULL: one material; see tlsphi_fill_interfaces */
     /* operator */
-    size_t *first;
-    uint32_t *neighbour; /* NULL without keeps_pairs, like g */
+    uint32_t *found; /* number of neighbours */
+    size_t *first;   /* NULL without keeps_pairs, like neighbour and g */
+    uint32_t *neighbour;
     tlsph_real *g, *rest; /* rest: r_ab, see [BONDS] */
     uint32_t *M_of;       /* the pattern of M of each tile of TLSPHI_LANES particles, in M (NULL: all are I); */
     tlsph_real *M;        /* DD x lanes each; a lattice has few */
@@ -4203,36 +4204,22 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
                                                              tlsphi_state_lanes *x, tlsph_real *row) {                 \
         tlsphi_constitute_lanes(s, m, x, row, dim, H, entropic, mooney);                                               \
     }
-TLSPHI_CONSTITUTE(2, 0, 0, 0)
-TLSPHI_CONSTITUTE(2, 0, 0, 1)
-TLSPHI_CONSTITUTE(2, 0, 1, 0)
-TLSPHI_CONSTITUTE(2, 0, 1, 1)
-TLSPHI_CONSTITUTE(2, 1, 0, 0)
-TLSPHI_CONSTITUTE(2, 1, 1, 0)
-TLSPHI_CONSTITUTE(3, 0, 0, 0)
-TLSPHI_CONSTITUTE(3, 0, 0, 1)
-TLSPHI_CONSTITUTE(3, 0, 1, 0)
-TLSPHI_CONSTITUTE(3, 0, 1, 1)
-TLSPHI_CONSTITUTE(3, 1, 0, 0)
-TLSPHI_CONSTITUTE(3, 1, 1, 0)
+#define TLSPHI_CONSTITUTIONS(X)                                                                                        \
+    X(2, 0, 0, 0) X(2, 0, 0, 1) X(2, 0, 1, 0) X(2, 0, 1, 1) X(2, 1, 0, 0) X(2, 1, 1, 0)                                \
+    X(3, 0, 0, 0) X(3, 0, 0, 1) X(3, 0, 1, 0) X(3, 0, 1, 1) X(3, 1, 0, 0) X(3, 1, 1, 0)
+TLSPHI_CONSTITUTIONS(TLSPHI_CONSTITUTE)
+#define TLSPHI_CASE(dim, H, entropic, mooney)                                                                          \
+    case 8 * (dim == 3) + 4 * H + 2 * entropic + mooney: tlsphi_constitute_##dim##H##entropic##mooney(s, m, x, row); break;
 
 static void tlsphi_constitute_tile(const tlsph_solver *s, const tlsphi_material *m, tlsphi_state_lanes *x,
                                    tlsph_real *row) {
     switch ((s->dim == 3 ? 8 : 0) + (s->has_H ? 4 : 0) + (m->entropic ? 2 : 0) + (m->mooney ? 1 : 0)) {
-    case 0: tlsphi_constitute_2000(s, m, x, row); break;
-    case 1: tlsphi_constitute_2001(s, m, x, row); break;
-    case 2: tlsphi_constitute_2010(s, m, x, row); break;
-    case 3: tlsphi_constitute_2011(s, m, x, row); break;
-    case 4: tlsphi_constitute_2100(s, m, x, row); break;
-    case 6: tlsphi_constitute_2110(s, m, x, row); break;
-    case 8: tlsphi_constitute_3000(s, m, x, row); break;
-    case 9: tlsphi_constitute_3001(s, m, x, row); break;
-    case 10: tlsphi_constitute_3010(s, m, x, row); break;
-    case 11: tlsphi_constitute_3011(s, m, x, row); break;
-    case 12: tlsphi_constitute_3100(s, m, x, row); break;
-    default: tlsphi_constitute_3110(s, m, x, row); break;
+        TLSPHI_CONSTITUTIONS(TLSPHI_CASE)
+    default: break; /* no laws of Mooney with H, see tlsphi_takes_lanes */
     }
 }
+#undef TLSPHI_CASE
+#undef TLSPHI_CONSTITUTIONS
 /* P M and H M in the rows of a tile. */
 TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, const int dim) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
@@ -5885,7 +5872,7 @@ static void tlsphi_apply_force(tlsph_solver *s, const tlsphi_load *load, const t
         const size_t a = load->inner[i];
         tlsph_real force[3] = {0, 0, 0}, Z[9], y[3] = {0, 0, 0};
         tlsphi_load_force(s, load, i, force, Z);
-        for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
+        for (size_t k = load->part ? s->first[a] : 0; load->part && k < s->first[a + 1]; k++) {
             tlsphi_lever(s, a, k, Z, y);
             tlsphi_push_particle(s, s->neighbour[k], y, stage, dt);
             for (int j = 0; j < s->dim; j++) force[j] -= y[j];
@@ -5920,7 +5907,7 @@ static void tlsphi_apply_heat(tlsph_solver *s, const tlsphi_load *load, const tl
         tlsph_real power = held ? 0 : tlsphi_heat_power(s, load, i), arm[3] = {0, 0, 0};
         for (int k = 0; load->part && k < s->dim; k++) arm[k] = power * load->part[i].o[k];
         if (held) tlsphi_held_heat(s, load, i, arm);
-        for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
+        for (size_t k = load->part ? s->first[a] : 0; load->part && k < s->first[a + 1]; k++) {
             const tlsph_real y = tlsphi_share_behind(s, a, k, arm);
             tlsphi_heat(s, s->neighbour[k], y, stage->rate_weight * dt);
             power -= y;
@@ -6032,7 +6019,7 @@ static int tlsphi_set_temperature(tlsph_solver *s, size_t a, tlsph_real theta) {
 static tlsph_real tlsphi_temperature_behind(const tlsph_solver *s, const tlsphi_load *load, size_t i) {
     const size_t a = load->inner[i];
     tlsph_real value = load->values[i], own = 1;
-    for (size_t k = s->first[a]; load->part && k < s->first[a + 1]; k++) {
+    for (size_t k = load->part ? s->first[a] : 0; load->part && k < s->first[a + 1]; k++) {
         const tlsph_real y = tlsphi_share_behind(s, a, k, load->part[i].o);
         value -= y * *tlsphi_theta(s, s->neighbour[k]);
         own -= y;
@@ -7146,7 +7133,7 @@ static void tlsphi_principal_data(tlsph_solver *s, size_t a, const tlsphi_point 
     for (size_t i = 0; i < D; i++) e->position[i] = (double)s->now.x[D * a + i];
     if (tlsphi_all_finite(pt->F, 9)) tlsphi_stretches(pt->F, e->stretches);
     e->temperature = (double)pt->theta;
-    e->neighbours = s->first[a + 1] - s->first[a];
+    e->neighbours = s->found[a];
     e->time = s->time;
     e->step = s->step;
 }
@@ -8010,7 +7997,7 @@ static int tlsphi_read_stored(const tlsph_solver *s, size_t a, tlsph_field field
         return 1;
     case TLSPH_FIELD_VOLUME: *out = s->V[a]; return 1;
     case TLSPH_FIELD_MASS: *out = s->V[a] * rho; return 1;
-    case TLSPH_FIELD_NEIGHBOURS: *out = (tlsph_real)(s->first[a + 1] - s->first[a]); return 1;
+    case TLSPH_FIELD_NEIGHBOURS: *out = (tlsph_real)s->found[a]; return 1;
     default: return 0;
     }
 }
@@ -8634,6 +8621,7 @@ static void tlsphi_count_blocks(tlsphi_plan *plan) {
    The vectors of a slot are a pattern; equal patterns are stored once, and a lattice has few. */
 
 #define TLSPHI_PATTERNS_SEEN 32768
+#define TLSPHI_PATTERNS_MOST 0xfffffffu /* as a slot can number */
 
 /* What building takes: the pairs of the particles of one tile, and arrays that grow. */
 typedef struct tlsphi_tiler {
@@ -8658,7 +8646,9 @@ static uint32_t tlsphi_pattern_number(tlsphi_plan *plan, tlsphi_patterns *p, con
     size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
     for (int probe = 0; probe < 8 && p->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
         if (memcmp(p->pattern + (p->seen[at] - 1) * reals, pattern, bytes) == 0) return p->seen[at] - 1;
-    if (!tlsphi_scratch_room(plan, (void **)&p->pattern, &p->room, p->count + 1, bytes)) return TLSPHI_NONE;
+    if (p->count == TLSPHI_PATTERNS_MOST ||
+        !tlsphi_scratch_room(plan, (void **)&p->pattern, &p->room, p->count + 1, bytes))
+        return TLSPHI_NONE;
     memcpy(p->pattern + p->count * reals, pattern, bytes);
     p->seen[at] = (uint32_t)++p->count; /* if the table is full there, an older one is forgotten */
     return p->seen[at] - 1;
@@ -8764,9 +8754,9 @@ static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
     if (pattern == TLSPHI_NONE ||
         !tlsphi_scratch_room(t->plan, (void **)&graph->slot, &t->slot_room, graph->slots + 1, sizeof *graph->slot))
         return 0;
-    graph->slot[graph->slots].pattern = pattern;
+    graph->slot[graph->slots].pattern = pattern & TLSPHI_PATTERNS_MOST;
     graph->slot[graph->slots].from = (uint32_t)from;
-    graph->slot[graph->slots++].scattered = scattered;
+    graph->slot[graph->slots++].scattered = scattered & 1;
     return 1;
 }
 /* Pair of a lane whose neighbour lies `lane - reference` behind b, if it has not been taken; t->most otherwise. */
@@ -9200,9 +9190,10 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     if (s->mirrors) s->mirror_of = TLSPHI_TAKE(arena, uint32_t, n);
     tlsphi_layout_loads(s, arena, plan);
     s->held_part = TLSPHI_TAKE(arena, tlsphi_held_part, s->held_parts);
+    s->found = TLSPHI_TAKE(arena, uint32_t, n);
     const size_t before_pairs = arena->used;
-    s->first = TLSPHI_TAKE(arena, size_t, n + 1);
-    s->size.bytes_per_particle = (before_pairs - fixed + (n + 1) * sizeof(size_t)) / n;
+    s->size.bytes_per_particle = (before_pairs - fixed) / n;
+    if (s->keeps_pairs) s->first = TLSPHI_TAKE(arena, size_t, n + 1);
     if (s->keeps_pairs) s->neighbour = TLSPHI_TAKE(arena, uint32_t, s->pairs);
     if (s->keeps_pairs) s->g = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     const int apart = s->keeps_pairs && plan->lattice;
@@ -9217,7 +9208,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
         s->super.conductance = TLSPHI_TAKE(arena, tlsph_real, TLSPHI_LANES * plan->graph->slots);
     if (plan->lattice) tlsphi_layout_graph(arena, plan->graph + 1, &s->damped_graph);
     else s->damped_graph = s->graph;
-    s->size.bytes_per_pair = (arena->used - before_pairs - (n + 1) * sizeof(size_t)) / (s->pairs ? s->pairs : 1);
+    s->size.bytes_per_pair = (arena->used - before_pairs) / (s->pairs ? s->pairs : 1);
     s->size.bytes = arena->used + 63;
     s->size.pairs = s->pairs;
     s->size.neighbours_least = plan->least;
@@ -9279,11 +9270,12 @@ static void tlsphi_fill_pairs(tlsph_solver *s, const tlsphi_plan *plan, uint32_t
     memcpy(s->tau, plan->tau, s->n * sizeof *s->tau);
     if (s->areas) memcpy(s->B_of, plan->B_of, s->areas * sizeof *s->B_of);
     if (s->areas) memcpy(s->B, plan->B, D * s->areas * sizeof *s->B);
-    for (size_t a = 0; a < s->n; a++) s->first[a + 1] = s->first[a] + plan->found[a];
-    TLSPH_ASSERT(s->first[s->n] == s->pairs);
+    memcpy(s->found, plan->found, s->n * sizeof *s->found);
     for (size_t a = 0; s->keeps_pairs && a < s->n; a++) {
         const uint32_t h = plan->host[a];
         const size_t start = s->first[a], count = tlsphi_neighbours_of(plan, h, list, g);
+        s->first[a + 1] = start + count;
+        TLSPH_ASSERT(start + count <= s->pairs);
         for (size_t i = 0; i < count; i++) list[i] = plan->inner[list[i]];
         tlsphi_sort_pairs(s->dim, list, g, count);
         for (size_t i = 0; i < count; i++) {
@@ -11411,7 +11403,7 @@ static int tlsphi_is_irregular(const tlsph_solver *s) {
     size_t inside = 0, open = 0;
     for (size_t a = 0; s->M && a < s->n; a++) {
         double B[3];
-        if (s->first[a + 1] - s->first[a] < s->size.neighbours_most) continue;
+        if (s->found[a] < s->size.neighbours_most) continue;
         tlsphi_vector3(tlsphi_boundary(s, a), s->dim, B);
         inside++;
         open += sqrt(tlsphi_norm2(B)) > 1e-3 * pow((double)s->V[a], (s->dim - 1.0) / s->dim);
@@ -11493,7 +11485,7 @@ static double tlsphi_survey_visits(const tlsph_solver *s) {
         const size_t *first = rates->first + 2 * l;
         for (size_t i = first[0]; first[0] < first[1] && i < first[2]; i++) {
             const tlsphi_block *block = s->block + rates->list[i];
-            visits += (double)(s->first[block->end] - s->first[block->begin]) * (1 << l);
+            for (size_t a = block->begin; a < block->end; a++) visits += (double)s->found[a] * (1 << l);
         }
     }
     return visits;
