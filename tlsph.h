@@ -8788,13 +8788,22 @@ typedef struct tlsphi_tiler {
     unsigned slot_axes;
 } tlsphi_tiler;
 
-/* Number of a set of numbers among its equals; TLSPHI_NONE if there is no memory. */
-static uint32_t tlsphi_pattern_number(tlsphi_plan *plan, tlsphi_patterns *p, const tlsph_real *pattern, size_t reals) {
+static int tlsphi_are_close(const tlsph_real *a, const tlsph_real *b, size_t n, double slack) {
+    for (size_t i = 0; slack > 0 && i < n; i++)
+        if (!(fabs((double)a[i] - (double)b[i]) <= slack)) return 0;
+    return slack > 0 || memcmp(a, b, n * sizeof *a) == 0;
+}
+/* Number of a set of numbers (at most 9 a lane) among its equals, to within a slack; TLSPHI_NONE if there is no memory. */
+static uint32_t tlsphi_pattern_number(tlsphi_plan *plan, tlsphi_patterns *p, const tlsph_real *pattern, size_t reals,
+                                      double slack) {
     const size_t bytes = reals * sizeof *pattern;
-    const uint64_t hash = tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)(const void *)pattern, bytes);
+    tlsph_real rounded[9 * TLSPHI_LANES];
+    for (size_t i = 0; slack > 0 && i < reals; i++) rounded[i] = (tlsph_real)floor((double)pattern[i] / slack + 0.5);
+    const void *const key = slack > 0 ? rounded : pattern;
+    const uint64_t hash = tlsphi_hash(0xcbf29ce484222325u, (const unsigned char *)key, bytes);
     size_t at = (size_t)(hash >> 20) % TLSPHI_PATTERNS_SEEN;
     for (int probe = 0; probe < 8 && p->seen[at]; probe++, at = (at + 1) % TLSPHI_PATTERNS_SEEN)
-        if (memcmp(p->pattern + (p->seen[at] - 1) * reals, pattern, bytes) == 0) return p->seen[at] - 1;
+        if (tlsphi_are_close(p->pattern + (p->seen[at] - 1) * reals, pattern, reals, slack)) return p->seen[at] - 1;
     if (p->count == TLSPHI_PATTERNS_MOST ||
         !tlsphi_scratch_room(plan, (void **)&p->pattern, &p->room, p->count + 1, bytes))
         return TLSPHI_NONE;
@@ -8902,7 +8911,7 @@ static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
 static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
     tlsphi_graph *graph = t->graph;
     const uint32_t pattern =
-        tlsphi_pattern_number(t->plan, &t->patterns, t->pattern, (size_t)graph->width * TLSPHI_LANES);
+        tlsphi_pattern_number(t->plan, &t->patterns, t->pattern, (size_t)graph->width * TLSPHI_LANES, 0);
     memset(t->pattern, 0, sizeof t->pattern);
     if (pattern == TLSPHI_NONE ||
         !tlsphi_scratch_room(t->plan, (void **)&graph->slot, &t->slot_room, graph->slots + 1, sizeof *graph->slot))
@@ -9001,20 +9010,25 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->graph->pattern = t->patterns.pattern;
     return TLSPH_OK;
 }
-/* M_a as lanes of tiles. */
+/* M_a as lanes of tiles. Those are the same that differ by what round-off of the positions does to them: force and gradient
+   stay adjoint, as they take the same M. */
 static tlsph_result tlsphi_tile_corrections(tlsphi_plan *plan) {
     const size_t dd = (size_t)(plan->dim * plan->dim), tiles = (plan->n - 1) / TLSPHI_LANES + 1;
     if (plan->antisymmetric) return TLSPH_OK;
     plan->M_of = TLSPHI_SCRATCH(plan, uint32_t, tiles);
     plan->M.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     if (!plan->M_of || !plan->M.seen) return tlsphi_no_memory(plan, 4.0 * (double)tiles);
+    double reach = 0;
+    for (size_t i = 0; i < 3 * plan->n; i++)
+        if (i % 3 < (size_t)plan->dim) reach = tlsphi_dmax(reach, fabs((double)tlsphi_position(plan, 0)[i]) / plan->h);
+    const double slack = tlsphi_dmin(4 * reach, 256) * TLSPHI_EPSILON;
     for (size_t tile = 0; tile < tiles; tile++) {
         tlsph_real lanes[9 * TLSPHI_LANES] = {0};
         for (size_t l = 0; l < TLSPHI_LANES && tile * TLSPHI_LANES + l < plan->n; l++)
             for (size_t i = 0; i < dd; i++)
                 lanes[i * TLSPHI_LANES + l] =
                     (tlsph_real)plan->correction[dd * plan->host[tile * TLSPHI_LANES + l] + i];
-        plan->M_of[tile] = tlsphi_pattern_number(plan, &plan->M, lanes, dd * TLSPHI_LANES);
+        plan->M_of[tile] = tlsphi_pattern_number(plan, &plan->M, lanes, dd * TLSPHI_LANES, slack);
         if (plan->M_of[tile] == TLSPHI_NONE) return tlsphi_no_memory(plan, 72.0 * (double)plan->n);
     }
     return TLSPH_OK;
