@@ -5592,22 +5592,15 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         for (size_t i = 0; s->leaps && i < (size_t)dim * TLSPHI_LANES; i++) sum->damped[i] += flux.T[i];
     }
 }
-static void tlsphi_flux_slots_20(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
-                                 tlsphi_lane_sums *sum) {
-    tlsphi_flux_slots(s, block, tile, base, 2, 0, parts, sum);
-}
-static void tlsphi_flux_slots_21(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
-                                 tlsphi_lane_sums *sum) {
-    tlsphi_flux_slots(s, block, tile, base, 2, 1, parts, sum);
-}
-static void tlsphi_flux_slots_30(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
-                                 tlsphi_lane_sums *sum) {
-    tlsphi_flux_slots(s, block, tile, base, 3, 0, parts, sum);
-}
-static void tlsphi_flux_slots_31(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
-                                 tlsphi_lane_sums *sum) {
-    tlsphi_flux_slots(s, block, tile, base, 3, 1, parts, sum);
-}
+#define TLSPHI_FLUX_SLOTS(dim, J)                                                                                      \
+    static void tlsphi_flux_slots_##dim##J(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, \
+                                           int parts, tlsphi_lane_sums *sum) {                                         \
+        tlsphi_flux_slots(s, block, tile, base, dim, J, parts, sum);                                                   \
+    }
+TLSPHI_FLUX_SLOTS(2, 0)
+TLSPHI_FLUX_SLOTS(2, 1)
+TLSPHI_FLUX_SLOTS(3, 0)
+TLSPHI_FLUX_SLOTS(3, 1)
 /* P += P_D M of the particles [begin, end) of a tile (TLSPH_SELF_ADJOINT). Other tasks read no P meanwhile. */
 TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin,
                                        size_t end, const int dim) {
@@ -9237,38 +9230,20 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
 }
 
 static void tlsphi_layout_state(tlsph_solver *s, tlsphi_arena *arena) {
-    const size_t D = (size_t)s->dim, n = s->n;
-    const size_t tensor = tlsphi_tensor_reals(n, D * D);
-    s->state_reals = tensor * (s->has_H ? 2 : 1) +
-                     n * (2 * D + (s->has_J ? 1 : 0) + (s->thermal ? 1 : 0) + (s->incompressible ? 1 : 0) +
-                          (s->has_plastic ? tlsphi_plastic_reals(s->dim, s->thermal) : 0));
+    const size_t D = (size_t)s->dim, n = s->n, tensor = tlsphi_tensor_reals(n, D * D);
+    const size_t plastic = s->has_plastic ? n * tlsphi_plastic_reals(s->dim, s->thermal) : 0;
+    const size_t reals[8] = {tensor, s->has_H ? tensor : 0, D * n, D * n, /* F first, on a boundary of cache lines */
+                             s->has_J ? n : 0, s->thermal ? n : 0, plastic, s->incompressible ? n : 0};
+    s->state_reals = 0;
+    for (int k = 0; k < 8; k++) s->state_reals += reals[k];
     s->now_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
     s->old_memory = TLSPHI_TAKE(arena, tlsph_real, s->state_reals);
     if (!arena->memory || arena->overflow) return;
     for (int i = 0; i < 2; i++) {
         tlsphi_state *u = i ? &s->old : &s->now;
         tlsph_real *at = i ? s->old_memory : s->now_memory;
-        memset(u, 0, sizeof *u);
-        u->F = at; /* first, on a boundary of cache lines */
-        at += tensor;
-        if (s->has_H) {
-            u->H = at;
-            at += tensor;
-        }
-        u->x = at;
-        at += D * n;
-        u->p = at;
-        at += D * n;
-        if (s->has_J) {
-            u->J = at;
-            at += n;
-        }
-        if (s->thermal) {
-            u->E = at;
-            at += n;
-        }
-        if (s->has_plastic) u->plastic = at;
-        if (s->incompressible) u->q = at; /* without plasticity */
+        tlsph_real **const parts[8] = {&u->F, &u->H, &u->x, &u->p, &u->J, &u->E, &u->plastic, &u->q};
+        for (int k = 0; k < 8; at += reals[k++]) *parts[k] = reals[k] ? at : NULL;
     }
 }
 static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
