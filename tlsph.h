@@ -4661,9 +4661,10 @@ TLSPHI_INLINE void tlsphi_take_components(const int width, const size_t *columns
 }
 
 /* The neighbours of a slot, as the address of their row 0: where they lie, or, scattered, in the spare columns of this
-   task's own rows, into which the rows [first, end) are copied. */
-TLSPHI_INLINE const tlsph_real *tlsphi_gather(const tlsph_solver *s, const tlsphi_block *block, const tlsphi_graph *graph,
-                                              const tlsphi_slot *slot, int first, int end) {
+   task's own rows, into which the rows first, first + step, ... < end are copied. */
+TLSPHI_INLINE const tlsph_real *tlsphi_gather_each(const tlsph_solver *s, const tlsphi_block *block,
+                                                   const tlsphi_graph *graph, const tlsphi_slot *slot, int first,
+                                                   int end, int step) {
     if (!slot->scattered) return tlsphi_at(s, 0, slot->from);
     tlsph_real *spare = s->row + (size_t)(block - s->block) * (size_t)s->rows.count * TLSPHI_ROW + TLSPHI_BLOCK;
     size_t at[TLSPHI_LANES];
@@ -4671,12 +4672,24 @@ TLSPHI_INLINE const tlsph_real *tlsphi_gather(const tlsph_solver *s, const tlsph
         const size_t b = graph->gathered[slot->from + l];
         at[l] = b / TLSPHI_BLOCK * (size_t)s->rows.count * TLSPHI_ROW + b % TLSPHI_BLOCK;
     }
-    for (size_t r = (size_t)first; r < (size_t)end; r++) {
+    for (size_t r = (size_t)first; r < (size_t)end; r += (size_t)step) {
         const tlsph_real *row = s->row + r * TLSPHI_ROW;
         tlsph_real *out = spare + r * TLSPHI_ROW;
         TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = row[at[l]];
     }
     return spare;
+}
+TLSPHI_INLINE const tlsph_real *tlsphi_gather(const tlsph_solver *s, const tlsphi_block *block, const tlsphi_graph *graph,
+                                              const tlsphi_slot *slot, int first, int end) {
+    return tlsphi_gather_each(s, block, graph, slot, first, end, 1);
+}
+/* Of the tensors only the column `axis`. */
+TLSPHI_INLINE const tlsph_real *tlsphi_gather_column(const tlsph_solver *s, const tlsphi_block *block,
+                                                     const tlsphi_graph *graph, const tlsphi_slot *slot,
+                                                     const tlsphi_rows *r, int axis, const int dim, int end) {
+    tlsphi_gather_each(s, block, graph, slot, r->w, r->P, 1);
+    tlsphi_gather_each(s, block, graph, slot, r->P + axis, r->wave, dim);
+    return tlsphi_gather_each(s, block, graph, slot, r->wave, end, 1);
 }
 /* G_ri += (f_b - f_a)_r g_i for consecutive rows r and the components i that g has, see tlsphi_columns. */
 TLSPHI_INLINE void tlsphi_gradient_columns(const tlsph_real *a, const tlsph_real *b, const tlsph_real *g, const int dim,
@@ -5555,13 +5568,15 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
     tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
     const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
     const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
+    const int thin = (!damps || s->dissipation == TLSPH_LIMITED) && (!heats || (s->conduction == TLSPH_COMPACT && !s->M));
     tlsphi_take_tile(tlsphi_at(s, 0, base), r.w, rows, a);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
-        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, r.w, rows);
         const size_t *const all = tlsphi_columns[7], *columns = tlsphi_columns[slot->axes];
-        const int width = tlsphi_widths[slot->axes];
+        const int width = tlsphi_widths[slot->axes], column = slot->scattered && width == 1 && thin;
+        const tlsph_real *b = column ? tlsphi_gather_column(s, block, graph, slot, &r, (int)columns[0], dim, rows)
+                                     : tlsphi_gather(s, block, graph, slot, r.w, rows);
         if (!(parts & TLSPHI_STRESSES)) {
         } else if (width == 1) tlsphi_stress_lanes(&r, a, b, g, dim, 1, columns, sum);
         else if (width < dim) tlsphi_stress_lanes(&r, a, b, g, dim, 2, columns, sum);
@@ -5587,6 +5602,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         else if (width < dim)
             front = tlsphi_damp_lanes(&r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, 0, s->jump_share, &flux);
         else front = tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 0, s->jump_share, &flux);
+        if (front && column) tlsphi_gather(s, block, graph, slot, r.P, r.wave);
         if (front) tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 1, s->jump_share, &flux);
         tlsphi_add_lanes(dim, &flux, sum);
         for (size_t i = 0; s->leaps && i < (size_t)dim * TLSPHI_LANES; i++) sum->damped[i] += flux.T[i];
