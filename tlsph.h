@@ -3494,10 +3494,10 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
    (F, H) and grad v lie by tiles, a component of all its particles side by side, as the loops over lanes take them. */
 
 /* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
-   P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, drift
-   ratio); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and grad w beside the sharpened. */
+   P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, with J the
+   drift ratio; X and rho are set at creation); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and grad w beside the sharpened. */
 typedef struct tlsphi_rows {
-    int v, w, X, P, A, slope_w, wave; /* D, D, D, DD, DD, DD, 4 */
+    int v, w, X, P, A, slope_w, wave; /* D, D, D, DD, DD, DD, 3 or 4 */
     int S, slope_S;                   /* 1, D: Sigma_J; with J */
     int theta;                        /* 1; thermal */
     int slope_theta, heat, h_J;       /* D, D, 1; with conduction */
@@ -3517,7 +3517,7 @@ TLSPHI_INLINE tlsphi_rows tlsphi_rows_of(const int dim, const int has_J, int the
     r.A = r.P + dd;
     r.slope_w = r.A + dd;
     r.wave = r.slope_w + dd;
-    r.S = r.wave + 4;
+    r.S = r.wave + (has_J ? 4 : 3);
     r.slope_S = r.S + 1;
     r.theta = r.S + (has_J ? 1 + dim : 0);
     r.slope_theta = r.theta + (thermal ? 1 : 0);
@@ -4048,7 +4048,7 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     const tlsphi_rows *r = &s->rows;
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const tlsph_real spread = s->metal ? tlsphi_largest_stretch_of_areas(pt) : 1;
-    const tlsph_real wave[4] = {pt->c_p / spread, pt->c_s / spread, m->rho, pt->drift_ratio};
+    const tlsph_real wave[2] = {pt->c_p / spread, pt->c_s / spread};
     tlsph_real P[9], H[9], PM[9], A[9], *v = s->v + D * a;
     tlsphi_shrink(dim, pt->P, P);
     tlsphi_shrink(dim, pt->H, H);
@@ -4061,7 +4061,8 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     if (!s->projection) tlsphi_row_put(s, r->w, dim, a, v);
     tlsphi_row_put(s, r->PM, dd, a, PM);
     tlsphi_row_put(s, r->A, dd, a, A);
-    tlsphi_row_put(s, r->wave, 4, a, wave);
+    tlsphi_row_put(s, r->wave, 2, a, wave);
+    if (s->has_J) *tlsphi_at(s, r->wave + 3, a) = pt->drift_ratio;
     if (s->has_J) *tlsphi_at(s, r->S, a) = pt->Sigma_J;
     if (s->thermal) *tlsphi_at(s, r->theta, a) = pt->theta;
     if (s->conducts) /* linear: H = I, J = 1 in (000-13) */
@@ -4128,7 +4129,7 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
 typedef struct tlsphi_state_lanes {
     const tlsph_real *F, *H;
     tlsph_real v[3 * TLSPHI_LANES], J[TLSPHI_LANES], E[TLSPHI_LANES], c_p[TLSPHI_LANES];
-    tlsph_real heat[TLSPHI_LANES], good[TLSPHI_LANES];
+    tlsph_real heat[TLSPHI_LANES], ratio[TLSPHI_LANES], good[TLSPHI_LANES];
 } tlsphi_state_lanes;
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
@@ -4191,8 +4192,7 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
         TLSPHI_UNROLL for (int i = 0; i < dd; i++) A[(size_t)i * TLSPHI_ROW + l] = out[i];
         wave[l] = x->c_p[l] = pt.c_p;
         wave[TLSPHI_ROW + l] = pt.c_s;
-        wave[2 * TLSPHI_ROW + l] = m.rho;
-        wave[3 * TLSPHI_ROW + l] = has_J ? pt.drift_ratio : 0;
+        x->ratio[l] = pt.drift_ratio;
         x->J[l] = pt.J;
         x->E[l] = theta;
         x->heat[l] = pt.Sigma_J;
@@ -4200,7 +4200,10 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
         TLSPHI_UNROLL for (int i = 0; i < 9; i++) all += pt.P[i];
         x->good[l] = (pt.d > 0) & (pt.J > 0) & (theta > 0) & tlsphi_finite(all) ? TLSPHI_R(1) : TLSPHI_R(0);
     }
-    for (size_t l = 0; has_J && l < TLSPHI_LANES; l++) row[(size_t)r.S * TLSPHI_ROW + l] = x->heat[l];
+    for (size_t l = 0; has_J && l < TLSPHI_LANES; l++) {
+        row[(size_t)r.S * TLSPHI_ROW + l] = x->heat[l];
+        wave[3 * TLSPHI_ROW + l] = x->ratio[l];
+    }
     for (size_t l = 0; heated && l < TLSPHI_LANES; l++) row[(size_t)r.theta * TLSPHI_ROW + l] = x->E[l];
     for (size_t l = 0; conducts && l < TLSPHI_LANES; l++) row[(size_t)r.h_J * TLSPHI_ROW + l] = m.h / x->J[l];
 }
@@ -5224,9 +5227,9 @@ TLSPHI_INLINE void tlsphi_load_side(const tlsphi_rows *r, const tlsph_real *at, 
     out->c_p = at[(size_t)(r->wave + 0) * apart];
     out->c_s = at[(size_t)(r->wave + 1) * apart];
     out->rho = at[(size_t)(r->wave + 2) * apart];
-    out->ratio = at[(size_t)(r->wave + 3) * apart];
-    out->S = 0;
+    out->S = out->ratio = 0;
     if (!with_J) return;
+    out->ratio = at[(size_t)(r->wave + 3) * apart];
     out->S = at[(size_t)r->S * apart];
     tlsphi_take_components(width, columns, at + (size_t)r->slope_S * apart, apart, out->slope_S);
 }
@@ -9413,6 +9416,7 @@ static void tlsphi_fill_particles(tlsph_solver *s, const tlsphi_plan *plan) {
         s->V[a] = (tlsph_real)tlsphi_plan_volume(plan, h);
         if (s->material_of)
             s->material_of[a] = plan->desc->particles.materials ? plan->desc->particles.materials[h] : 0;
+        *tlsphi_at(s, s->rows.wave + 2, a) = tlsphi_material_of(s, a)->rho;
         for (size_t i = 0; i < D; i++) {
             s->now.x[D * a + i] = plan->desc->particles.positions[3 * h + i];
             tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW] = s->now.x[D * a + i];
