@@ -195,6 +195,13 @@ static int moving_block_conditions(const moving_block *s, const tlsph_particles 
     conditions[0] = tlsph_condition_default(TLSPH_CLAMPED);
     conditions[0].particles = left;
     conditions[0].count = tlsph_select_plane(particles, 0, 0, R(1e-4), left, particles->count);
+    if (s->unloaded == 1) return 1;
+    if (s->unloaded == 2) {
+        conditions[1] = tlsph_condition_default(TLSPH_WALL);
+        conditions[1].normal[1] = 1;
+        conditions[1].point[1] = -100;
+        return 2;
+    }
     conditions[1] = tlsph_condition_default(TLSPH_ACCELERATION);
     conditions[1].value[1] = R(-9.81);
     if (s->thermal == TLSPH_ISOTHERMAL) return 2;
