@@ -930,15 +930,15 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #ifdef TLSPH_REAL_FLOAT
 #define tlsphi_sqrt sqrtf
 #define tlsphi_pow powf
-#define tlsphi_exp expf
 #define tlsphi_log logf
 #define tlsphi_abs fabsf
+#define tlsphi_copysign copysignf
 #else
 #define tlsphi_sqrt sqrt
 #define tlsphi_pow pow
-#define tlsphi_exp exp
 #define tlsphi_log log
 #define tlsphi_abs fabs
+#define tlsphi_copysign copysign
 #endif
 
 #define TLSPHI_COOKIE 0x544c5350u /* "TLSP" */
@@ -1008,6 +1008,34 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real given) {
     return y;
 }
 TLSPHI_INLINE tlsph_real tlsphi_square_root(tlsph_real x) { return x * tlsphi_inverse_root(x); }
+/* e^x to a digit or two of the last place, for loops over lanes: 2^n through the exponent's bits times a polynomial of what
+   is left of x, |r| < 0.35. For |x| beyond the range of normal numbers, and for what is not finite, that of its end; with
+   two comparisons gcc would follow each of their outcomes, and make no vectors. A large number of spacing 1 rounds to n and
+   has n as its last bits; the others are set again so that -ffast-math does not take it away at once. */
+TLSPHI_INLINE tlsph_real tlsphi_exp(tlsph_real given) {
+#ifdef TLSPH_REAL_FLOAT
+    const tlsph_real most = 87, large = 12582912, high = 0.693359375f, low = -2.12194440e-4f; /* high + low = ln 2, */
+    const tlsphi_bits set = 0x4b000000u, bias = 127;                                          /* n high is exact */
+    enum { TERMS = 7, SHIFT = 23 };
+#else
+    const tlsph_real most = 708, large = 6755399441055744.0, high = 0.693145751953125, low = 1.42860682030941723212e-6;
+    const tlsphi_bits set = 0x4330000000000000u, bias = 1023;
+    enum { TERMS = 13, SHIFT = 52 };
+#endif
+    const tlsph_real size = tlsphi_abs(given), x = tlsphi_copysign(size < most ? size : most, given);
+    tlsph_real n = x * TLSPHI_R(1.4426950408889634) + large, y = 1, power;
+    tlsphi_bits bits;
+    memcpy(&bits, &n, sizeof bits);
+    bits |= set;
+    memcpy(&n, &bits, sizeof n);
+    bits = (bits + bias) << SHIFT;
+    memcpy(&power, &bits, sizeof power);
+    n -= large;
+    const tlsph_real r = (x - n * high) - n * low;
+    TLSPHI_UNROLL for (int i = TERMS; i > 7; i--) y = 1 + y * r * TLSPHI_R(1.0 / i); /* two loops, as only 9 are unrolled */
+    TLSPHI_UNROLL for (int i = 7; i > 0; i--) y = 1 + y * r * TLSPHI_R(1.0 / i);
+    return y * power;
+}
 /* 1/x, or 0 for x = 0: lanes without a pair have nothing else than zeros, in whatever order a compiler multiplies them. */
 TLSPHI_INLINE tlsph_real tlsphi_inverse_or_0(tlsph_real x) {
     const tlsph_real inverse = 1 / (x > TLSPHI_TINY ? x : TLSPHI_TINY);
@@ -3916,8 +3944,10 @@ TLSPHI_INLINE tlsph_real tlsphi_add_drift(const tlsphi_material *m, tlsph_real s
 static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *u, const tlsphi_material *m, size_t a,
                                      const tlsphi_point *pt) {
     if (s->thermal == TLSPH_ENERGY) return m->theta_R + (u->E[a] - pt->kinetic - pt->r.energy) / m->c_v;
-    if (s->thermal == TLSPH_ENTROPY)
-        return m->theta_R * tlsphi_exp((u->E[a] + pt->plastic.entropy - pt->r.entropy) / m->c_v);
+    if (s->thermal == TLSPH_ENTROPY) {
+        const tlsph_real heat = (u->E[a] + pt->plastic.entropy - pt->r.entropy) * (1 / m->c_v);
+        return tlsphi_finite(heat) ? m->theta_R * tlsphi_exp(heat) : heat;
+    }
     return m->theta_R;
 }
 
@@ -4123,7 +4153,7 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
     return 1;
 }
 
-/* -- the same for a tile of one material, by lanes: the built-in laws but for powers of J, isothermal or with E -- */
+/* -- the same for a tile of one material, by lanes: the built-in laws but for powers of J -- */
 
 /* A tile's state as lanes. */
 typedef struct tlsphi_state_lanes {
@@ -4134,7 +4164,7 @@ typedef struct tlsphi_state_lanes {
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
     const tlsphi_material *m = tlsphi_material_of(s, begin);
-    if (end - begin < TLSPHI_LANES || s->audit || s->thermal == TLSPH_ENTROPY || s->incompressible || s->least_stretch || s->metal ||
+    if (end - begin < TLSPHI_LANES || s->audit || s->incompressible || s->least_stretch || s->metal ||
         s->coupling == TLSPH_JOINT_AS_PRINTED || !tlsphi_has_invariants(m->kind) || m->q != 1 || (s->has_H && m->mooney))
         return 0;
     for (size_t a = begin; a < end; a++)
@@ -4164,7 +4194,9 @@ TLSPHI_INLINE void tlsphi_take_measures(const tlsphi_state_lanes *x, size_t l, c
 TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_material *given, tlsphi_state_lanes *x,
                                            tlsph_real *row, const int dim, const int has_H, const int entropic,
                                            const int mooney) {
-    const int dd = dim * dim, has_J = s->has_J, heated = s->thermal == TLSPH_ENERGY, conducts = s->conducts;
+    const int dd = dim * dim, has_J = s->has_J, heated = s->thermal != TLSPH_ISOTHERMAL, conducts = s->conducts;
+    /* factors 0 or 1, as a choice would keep gcc from making vectors */
+    const tlsph_real by_energy = s->thermal == TLSPH_ENERGY, by_entropy = s->thermal == TLSPH_ENTROPY;
     const tlsphi_rows r = s->rows;
     const tlsph_real stiffness = has_J ? s->drift_stiffness * given->mu : 0, scale = s->drift_scale;
     const tlsph_real per_c_v = 1 / given->c_v;
@@ -4184,7 +4216,9 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) pt.kinetic +=
             x->v[(size_t)i * TLSPHI_LANES + l] * x->v[(size_t)i * TLSPHI_LANES + l];
         pt.kinetic *= m.rho / 2;
-        const tlsph_real theta = m.theta_R + (heated ? (x->E[l] - pt.kinetic - pt.r.energy) * per_c_v : 0);
+        const tlsph_real elastic = by_energy * pt.r.energy + by_entropy * pt.r.entropy;
+        const tlsph_real heat = (x->E[l] - by_energy * pt.kinetic - elastic) * per_c_v;
+        const tlsph_real theta = m.theta_R * tlsphi_exp(by_entropy * heat) + by_energy * heat;
         tlsphi_conclude(&m, theta, pt.r.e_J - theta * pt.r.eta_J, &pt);
         tlsphi_shrink(dim, pt.P, out);
         TLSPHI_UNROLL for (int i = 0; i < dd; i++) P[(size_t)i * TLSPHI_ROW + l] = out[i];
@@ -4196,7 +4230,7 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
         x->J[l] = pt.J;
         x->E[l] = theta;
         x->heat[l] = pt.Sigma_J;
-        tlsph_real all = pt.d + pt.J + theta + pt.c_p + pt.kinetic; /* finite only if all of them are */
+        tlsph_real all = pt.d + pt.J + heat + theta + pt.c_p + pt.kinetic; /* finite only if all of them are */
         TLSPHI_UNROLL for (int i = 0; i < 9; i++) all += pt.P[i];
         x->good[l] = (pt.d > 0) & (pt.J > 0) & (theta > 0) & tlsphi_finite(all) ? TLSPHI_R(1) : TLSPHI_R(0);
     }
@@ -4282,7 +4316,7 @@ TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, siz
     x.F = s->now.F + dd * begin;
     x.H = s->has_H ? s->now.H + dd * begin : NULL;
     if (s->has_J) memcpy(x.J, s->now.J + begin, TLSPHI_LANES * sizeof *x.J);
-    if (s->thermal) memcpy(x.E, s->now.E + begin, TLSPHI_LANES * sizeof *x.E);
+    for (size_t l = 0; l < TLSPHI_LANES; l++) x.E[l] = s->thermal ? s->now.E[begin + l] : 0;
     tlsphi_constitute_tile(s, m, &x, row);
     for (size_t l = 0; l < TLSPHI_LANES; l++) good *= x.good[l];
     if (good < 1) return 0;

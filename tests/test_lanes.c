@@ -113,5 +113,27 @@ TEST(other_dissipations)
         compare_all(s, 0.5);
     }
 }
+/* The entropy of a temperature is a logarithm of libm, the temperature of an entropy our own exponential. */
+TEST(temperature_of_entropy)
+{
+    moving_block s = body(3, 0);
+    tlsph_solver *solver;
+    double worst = 0;
+    s.thermal = TLSPH_ENTROPY;
+    s.unknowns = TLSPH_PF;
+    if (!CHECK_RESULT(moving_block_create(&s, &solver, NULL), TLSPH_OK)) return;
+    const size_t n = tlsph_count(solver);
+    tlsph_real *given = read_field(solver, TLSPH_FIELD_TEMPERATURE), *read = NULL;
+    for (size_t a = 0; a < n; a++) given[a] = R(300 * exp(12.0 * (double)a / (double)n - 6)); /* 0.7 K to 120,000 K */
+    if (CHECK_RESULT(tlsph_write(solver, TLSPH_FIELD_TEMPERATURE, given), TLSPH_OK))
+        read = read_field(solver, TLSPH_FIELD_TEMPERATURE);
+    for (size_t a = 0; read && a < n; a++) worst = fmax(worst, fabs((double)(read[a] / given[a]) - 1));
+    CHECK(read && worst < 40 * (sizeof(tlsph_real) == 4 ? 1.2e-7 : 2.3e-16)); /* entropies of some 6 c_v round by 6 eps */
+    REPORT(" %.1e", worst);
+    free(given);
+    free(read);
+    tlsph_destroy(solver);
+}
 
-SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(fronts), ENTRY(leapfrog), ENTRY(other_dissipations))
+SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(fronts), ENTRY(leapfrog), ENTRY(other_dissipations),
+      ENTRY(temperature_of_entropy))
