@@ -4199,7 +4199,7 @@ TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_m
     const tlsph_real by_energy = s->thermal == TLSPH_ENERGY, by_entropy = s->thermal == TLSPH_ENTROPY;
     const tlsphi_rows r = s->rows;
     const tlsph_real stiffness = has_J ? s->drift_stiffness * given->mu : 0, scale = s->drift_scale;
-    const tlsph_real per_c_v = 1 / given->c_v;
+    const tlsph_real per_c_v = heated ? 1 / given->c_v : 0; /* isothermal scenes may have none */
     tlsphi_material m = *given;
     m.entropic = entropic;
     m.mooney = mooney;
