@@ -610,8 +610,9 @@ typedef struct tlsph_cloud {
 typedef struct tlsph_operator {
     size_t count, pairs;
     int dimension, corrected;      /* 1: M_a by tlsph_correction_read, 0: M_a = I */
-    const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1; NULL where pairs are */
-    const uint32_t *neighbours;    /* not kept (see desc.keep_pairs), like these: b, solver's order; */
+    /* NULL where the scene keeps no pairs (see desc.keep_pairs): */
+    const size_t *first;           /* count + 1: pairs of a are first[a] ... first[a + 1] - 1 */
+    const uint32_t *neighbours;    /* b, solver's order */
     const tlsph_real *vectors;     /* g_ab, `dimension` each, antisymmetric */
     const tlsph_real *rests;       /* r_ab, `dimension` each, or NULL */
     const tlsph_real *volumes;     /* V_a */
