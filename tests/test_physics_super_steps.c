@@ -94,14 +94,15 @@ TEST(balances_with_source) { balances(TLSPH_ENERGY, TLSPH_HEAT_SOURCE, 0); }
 
 /* Stages by tiles and, with `audit`, pair by pair: temperatures differ by round-off only, and so does the entropy. */
 static double compare_with_pairs(warm_block w) {
-    tlsph_real *theta[2];
+    tlsph_real *theta[2], dt = 0;
     tlsph_ledger ledger[2];
     double most = 0;
     for (int i = 0; i < 2; i++) {
         scene_body body;
         w.options.audit = i;
         if (!CHECK_RESULT(warm_create(&w, &body), TLSPH_OK)) return 0;
-        for (int k = 0; k < 3; k++) CHECK_RESULT(tlsph_step(body.solver, 1), TLSPH_OK);
+        if (i == 0) dt = R(0.9) * tlsph_stable_time_step(body.solver); /* one for both, see BOUNDED */
+        for (int k = 0; k < 3; k++) CHECK_RESULT(tlsph_step(body.solver, dt), TLSPH_OK);
         theta[i] = scene_read(body.solver, TLSPH_FIELD_TEMPERATURE);
         tlsph_ledger_read(body.solver, ledger + i);
         if (!CHECK(theta[i] != NULL)) return 0;
