@@ -3523,8 +3523,9 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
    (F, H) and grad v lie by tiles, a component of all its particles side by side, as the loops over lanes take them. */
 
 /* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
-   P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, with J the
-   drift ratio; X and rho are set at creation); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and grad w beside the sharpened. */
+   P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, with J
+   the drift ratio; X and rho are set at creation); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and
+   grad w beside the sharpened. */
 typedef struct tlsphi_rows {
     int v, w, X, P, A, slope_w, wave; /* D, D, D, DD, DD, DD, 3 or 4 */
     int S, slope_S;                   /* 1, D: Sigma_J; with J */
