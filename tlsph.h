@@ -5600,6 +5600,32 @@ static const tlsph_real *tlsphi_mask_slot(const tlsph_solver *s, const tlsphi_gr
     }
     return out;
 }
+/* By the columns that the vectors of a slot have: stresses; heat; the default dissipation, as tlsphi_damp_lanes. */
+TLSPHI_INLINE void tlsphi_stress_slot(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b, const tlsph_real *g,
+                                      const int dim, int axes, tlsphi_lane_sums *sum) {
+    const int width = tlsphi_widths[axes];
+    if (width == 1) tlsphi_stress_lanes(r, a, b, g, dim, 1, tlsphi_columns[axes], sum);
+    else if (width < dim) tlsphi_stress_lanes(r, a, b, g, dim, 2, tlsphi_columns[axes], sum);
+    else tlsphi_stress_lanes(r, a, b, g, dim, dim, tlsphi_columns[7], sum);
+}
+TLSPHI_INLINE void tlsphi_heat_slot(const tlsph_solver *s, const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                    const tlsph_real *g, const int dim, int axes, tlsphi_lane_sums *sum) {
+    const size_t *const all = tlsphi_columns[7];
+    if (s->conduction != TLSPH_COMPACT) tlsphi_heat_lanes(r, a, b, g, dim, dim, all, s->thermal, 0, 0, sum);
+    else if (s->M) tlsphi_heat_lanes(r, a, b, g, dim, dim, all, s->thermal, 1, 1, sum);
+    else if (tlsphi_widths[axes] == 1)
+        tlsphi_heat_lanes(r, a, b, g, dim, 1, tlsphi_columns[axes], s->thermal, 1, 0, sum);
+    else tlsphi_heat_lanes(r, a, b, g, dim, dim, all, s->thermal, 1, 0, sum);
+}
+TLSPHI_INLINE int tlsphi_limited_slot(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b, const tlsph_real *g,
+                                      const int dim, int axes, const int with_J, tlsph_real jump_share,
+                                      tlsphi_lane_sums *out) {
+    const size_t *const columns = tlsphi_columns[axes], *const all = tlsphi_columns[7];
+    const int width = tlsphi_widths[axes];
+    if (width == 1) return tlsphi_damp_lanes(r, a, b, g, dim, 1, columns, with_J, TLSPH_LIMITED, 0, jump_share, out);
+    if (width < dim) return tlsphi_damp_lanes(r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, 0, jump_share, out);
+    return tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 0, jump_share, out);
+}
 TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
                                      const int dim, const int with_J, int parts, tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
@@ -5612,19 +5638,13 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
-        const size_t *const all = tlsphi_columns[7], *columns = tlsphi_columns[slot->axes];
-        const int width = tlsphi_widths[slot->axes], column = slot->scattered && width == 1 && thin;
-        const tlsph_real *b = column ? tlsphi_gather_column(s, block, graph, slot, &r, (int)columns[0], dim, rows)
+        const size_t *const all = tlsphi_columns[7];
+        const int column = slot->scattered && tlsphi_widths[slot->axes] == 1 && thin;
+        const int axis = (int)tlsphi_columns[slot->axes][0];
+        const tlsph_real *b = column ? tlsphi_gather_column(s, block, graph, slot, &r, axis, dim, rows)
                                      : tlsphi_gather(s, block, graph, slot, r.w, rows);
-        if (!(parts & TLSPHI_STRESSES)) {
-        } else if (width == 1) tlsphi_stress_lanes(&r, a, b, g, dim, 1, columns, sum);
-        else if (width < dim) tlsphi_stress_lanes(&r, a, b, g, dim, 2, columns, sum);
-        else tlsphi_stress_lanes(&r, a, b, g, dim, dim, all, sum);
-        if (!heats) {
-        } else if (s->conduction != TLSPH_COMPACT) tlsphi_heat_lanes(&r, a, b, g, dim, dim, all, s->thermal, 0, 0, sum);
-        else if (s->M) tlsphi_heat_lanes(&r, a, b, g, dim, dim, all, s->thermal, 1, 1, sum);
-        else if (width == 1) tlsphi_heat_lanes(&r, a, b, g, dim, 1, columns, s->thermal, 1, 0, sum);
-        else tlsphi_heat_lanes(&r, a, b, g, dim, dim, all, s->thermal, 1, 0, sum);
+        if (parts & TLSPHI_STRESSES) tlsphi_stress_slot(&r, a, b, g, dim, slot->axes, sum);
+        if (heats) tlsphi_heat_slot(s, &r, a, b, g, dim, slot->axes, sum);
         if (!damps) continue;
         tlsph_real masked[4 * TLSPHI_LANES];
         if (block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
@@ -5636,11 +5656,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
             tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_RECONSTRUCTED, 0, s->jump_share, &flux);
         else if (s->dissipation == TLSPH_SELF_ADJOINT)
             tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_SELF_ADJOINT, 0, s->jump_share, &flux);
-        else if (width == 1)
-            front = tlsphi_damp_lanes(&r, a, b, g, dim, 1, columns, with_J, TLSPH_LIMITED, 0, s->jump_share, &flux);
-        else if (width < dim)
-            front = tlsphi_damp_lanes(&r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, 0, s->jump_share, &flux);
-        else front = tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 0, s->jump_share, &flux);
+        else front = tlsphi_limited_slot(&r, a, b, g, dim, slot->axes, with_J, s->jump_share, &flux);
         if (front && column) tlsphi_gather(s, block, graph, slot, r.P, r.wave);
         if (front) tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 1, s->jump_share, &flux);
         tlsphi_add_lanes(dim, &flux, sum);
