@@ -1478,6 +1478,14 @@ typedef struct tlsphi_slot {
     unsigned axes : 3; /* bit i: some of its vectors C_ab or X_b - X_a have a component i */
     uint32_t from; /* first of the neighbours side by side, or where the lanes' neighbours begin in `gathered` */
 } tlsphi_slot;
+/* Magnitudes of pair vectors, each of which stands for all that differ from it by the round-off of positions. */
+#define TLSPHI_MAGNITUDES_SEEN 4096
+typedef struct tlsphi_magnitudes {
+    double value[TLSPHI_MAGNITUDES_SEEN / 4]; /* in the order of their coming */
+    uint16_t seen[TLSPHI_MAGNITUDES_SEEN];    /* hash table by value/slack, number + 1 */
+    unsigned count;
+    double slack;
+} tlsphi_magnitudes;
 /* Different sets of numbers, each of which is stored once. */
 typedef struct tlsphi_patterns {
     size_t count, room;
@@ -1505,6 +1513,7 @@ typedef struct tlsphi_plan {
     int dim;
     size_t n, pairs, least, most; /* particles, directed pairs, fewest and most neighbours */
     double h;                     /* smoothing length */
+    tlsphi_magnitudes *magnitudes;
     tlsphi_grid grid;
     const tlsph_real *weights; /* w_a */
     size_t *cell_first;        /* TLSPH_CELLS: cells around each particle, */
@@ -1952,11 +1961,49 @@ static tlsph_result tlsphi_fourth_build(tlsphi_plan *plan) {
     return TLSPH_OK;
 }
 
+/* What round-off of the positions may change in a pair vector of length 1, in M_a, or in lengths over h. */
+static double tlsphi_position_slack(const tlsphi_plan *plan) {
+    double reach = 0;
+    for (size_t i = 0; i < 3 * plan->n; i++)
+        if (i % 3 < (size_t)plan->dim) reach = tlsphi_dmax(reach, fabs((double)tlsphi_position(plan, 0)[i]) / plan->h);
+    return tlsphi_dmin(4 * reach, 256) * TLSPHI_EPSILON;
+}
+/* The first of the magnitudes that is within the slack of x; x itself, if there is none, is one from then on, while there
+   is room. So an x stands for the same whenever it is asked for. */
+static double tlsphi_common_magnitude(tlsphi_magnitudes *m, double x) {
+    const double cell = floor(x / m->slack); /* holds one at most, as all in it are within the slack of each other */
+    size_t at = 0;
+    unsigned number = 0;
+    for (int i = 0; i < 3; i++) {
+        const double key = cell + (i < 2 ? 2 * i - 1 : 0); /* its own cell last: `at` is where x may be put */
+        unsigned found;
+        uint64_t bits;
+        memcpy(&bits, &key, sizeof bits);
+        at = (size_t)(bits * 0x9e3779b97f4a7c15u >> 52);
+        for (; (found = m->seen[at]) > 0; at = (at + 1) % TLSPHI_MAGNITUDES_SEEN)
+            if (floor(m->value[found - 1] / m->slack) == key) break;
+        if (found && fabs(m->value[found - 1] - x) <= m->slack && (!number || found < number)) number = found;
+    }
+    if (number) return m->value[number - 1];
+    if (m->count == TLSPHI_MAGNITUDES_SEEN / 4) return x;
+    m->value[m->count++] = x;
+    m->seen[at] = (uint16_t)m->count;
+    return x;
+}
 /* Kernels' vectors that differ by the round-off of positions become the same, so that few patterns serve for a lattice (see
    [TILES]). Rounding is odd: C_ab = -C_ba stays exact, and M_a is made from what is rounded. */
 static void tlsphi_round_vectors(const tlsphi_plan *plan, double *g, size_t reals) {
     const double quantum = (plan->dim == 3 ? plan->h * plan->h : plan->h) * (TLSPHI_EPSILON > 1e-10 ? 1e-6 : 1e-14);
-    for (size_t i = 0; i < reals; i++) g[i] = (g[i] < 0 ? -1 : 1) * floor(fabs(g[i]) / quantum + 0.5) * quantum;
+    for (size_t i = 0; i < reals; i++) {
+        const double rounded = floor(fabs(g[i]) / quantum + 0.5) * quantum;
+        g[i] = (g[i] < 0 ? -1 : 1) * tlsphi_common_magnitude(plan->magnitudes, rounded);
+    }
+}
+static tlsph_result tlsphi_start_rounding(tlsphi_plan *plan) {
+    plan->magnitudes = TLSPHI_SCRATCH(plan, tlsphi_magnitudes, 1);
+    if (!plan->magnitudes) return tlsphi_no_memory(plan, (double)sizeof(tlsphi_magnitudes));
+    plan->magnitudes->slack = tlsphi_position_slack(plan) * (plan->dim == 3 ? plan->h * plan->h : plan->h);
+    return TLSPH_OK;
 }
 static size_t tlsphi_neighbours_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
     switch (plan->desc->operator_kind) {
@@ -9082,10 +9129,7 @@ static tlsph_result tlsphi_tile_corrections(tlsphi_plan *plan) {
     plan->M_of = TLSPHI_SCRATCH(plan, uint32_t, tiles);
     plan->M.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     if (!plan->M_of || !plan->M.seen) return tlsphi_no_memory(plan, 4.0 * (double)tiles);
-    double reach = 0;
-    for (size_t i = 0; i < 3 * plan->n; i++)
-        if (i % 3 < (size_t)plan->dim) reach = tlsphi_dmax(reach, fabs((double)tlsphi_position(plan, 0)[i]) / plan->h);
-    const double slack = tlsphi_dmin(4 * reach, 256) * TLSPHI_EPSILON;
+    const double slack = tlsphi_position_slack(plan);
     for (size_t tile = 0; tile < tiles; tile++) {
         tlsph_real lanes[9 * TLSPHI_LANES] = {0};
         for (size_t l = 0; l < TLSPHI_LANES && tile * TLSPHI_LANES + l < plan->n; l++)
@@ -9198,7 +9242,7 @@ static tlsph_result tlsphi_plan_make(tlsphi_plan *plan, const tlsph_desc *desc, 
     if (desc->operator_kind == TLSPH_CELLS_4 && (r = tlsphi_fourth_build(plan))) return r;
     if (desc->operator_kind == TLSPH_GIVEN && (r = tlsphi_given_check(plan))) return r;
     tlsphi_smoothing_length(plan);
-    if ((r = tlsphi_grid_build(plan))) return r;
+    if ((r = tlsphi_grid_build(plan)) || (r = tlsphi_start_rounding(plan))) return r;
     const size_t most = tlsphi_count_pairs(plan), D = (size_t)plan->dim;
     uint32_t *list = TLSPHI_SCRATCH(plan, uint32_t, most);
     double *g = TLSPHI_SCRATCH(plan, double, D *most);
