@@ -138,6 +138,19 @@ static int by_address(const void *a, const void *b) {
     EACH(found) EACH(damped_first) EACH(first) EACH(damped_neighbour) EACH(neighbour) EACH(damped_g) EACH(g)          \
     EACH(image) EACH(graph.first) EACH(graph.slot) EACH(graph.gathered) EACH(graph.pattern)
 
+/* Of the whole tiles, the share whose state is evaluated by lanes. Were it less than 1 on a lattice, results would be right
+   all the same, and slow. */
+static double share_by_lanes(tlsph_solver *s) {
+    size_t whole = 0, by_lanes = 0;
+    for (size_t i = 0; i < s->blocks; i++)
+        for (size_t begin = s->block[i].begin, end; begin < s->block[i].end; begin = end) {
+            end = tlsphi_tile_end(s->block + i, begin);
+            whole += end - begin == TLSPHI_LANES;
+            by_lanes += tlsphi_evaluate_lanes(s, s->block + i, begin, end) != 0;
+        }
+    return (double)by_lanes / (double)whole;
+}
+
 static void list_arrays(int n, tlsph_unknowns unknowns, tlsph_thermal thermal, const char *name, FILE *csv) {
     body b;
     tlsph_solver *s;
@@ -160,6 +173,7 @@ static void list_arrays(int n, tlsph_unknowns unknowns, tlsph_thermal thermal, c
         fprintf(csv, "%s,%s,%.2f\n", name, all[i].name, bytes);
     }
     printf(" in all %.0f\n", (double)s->size.bytes / (double)s->n);
+    ex_check("tiles_by_lanes", share_by_lanes(s), 1, 0);
     tlsph_destroy(s);
     tlsph_cloud_destroy(&b.cloud);
 }

@@ -99,6 +99,36 @@ TEST(leanest_scene_is_lean)
     CHECK(bytes <= 60 * sizeof(tlsph_real));
 }
 
+/* 4,096 particles with 26 neighbours at multiples of `spacing`, away from the origin by `shift`. */
+static double bytes_on_lattice(double spacing, const double shift[3])
+{
+    static const int cells[3] = {15, 15, 15};
+    plain_scene s;
+    tlsph_size size;
+    memset(&size, 0, sizeof size);
+    if (!CHECK(plain_scene_make(&s, 3, TLSPH_PFHJ, TLSPH_ENERGY))) return 0;
+    own_cloud_destroy(&s.cloud);
+    if (!CHECK(own_box(&s.cloud, 3, cells, spacing, 0))) return 0;
+    tlsph_real *X = s.cloud.positions;
+    for (size_t i = 0; i < 3 * s.cloud.particles.count; i++) X[i] += R(shift[i % 3]);
+    s.desc.particles = s.cloud.particles;
+    s.desc.support = R(0.9);
+    CHECK_RESULT(tlsph_measure(&s.desc, &size, NULL), TLSPH_OK);
+    own_cloud_destroy(&s.cloud);
+    return (double)size.bytes_per_particle + (double)size.bytes_per_pair * (double)size.pairs / 4096;
+}
+/* Positions that are no sums of powers of 2 are rounded, and every pair is another: what they were meant to be is stored
+   once all the same, pair vectors and corrections. */
+TEST(rounded_lattices_share_their_pairs)
+{
+    static const double none[3] = {0, 0, 0}, aside[3] = {0.37, -5.3, 1.1};
+    const double exact = bytes_on_lattice(0.125, none), rounded = bytes_on_lattice(0.1, none);
+    const double shifted = bytes_on_lattice(0.1, aside);
+    REPORT("%.0f, %.0f, %.0f bytes a particle", exact, rounded, shifted);
+    CHECK_BELOW(rounded, 1.02 * exact);
+    CHECK_BELOW(shifted, 1.02 * exact);
+}
+
 /* What keeping the pairs costs, and that nothing else depends on it: neither states nor the survey before the run. */
 TEST(pairs_are_kept_on_request)
 {
@@ -632,7 +662,7 @@ TEST(destroying_nothing)
 }
 
 SUITE(memory, ENTRY(every_unknown_adds_bytes), ENTRY(heat_adds_bytes), ENTRY(two_dimensions_need_less),
-      ENTRY(leanest_scene_is_lean), ENTRY(pairs_are_kept_on_request), ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
+      ENTRY(leanest_scene_is_lean), ENTRY(rounded_lattices_share_their_pairs), ENTRY(pairs_are_kept_on_request), ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
       ENTRY(field_table), ENTRY(callers_memory_is_used), ENTRY(callers_memory_too_small),
       ENTRY(failing_allocations_leak_nothing), ENTRY(failing_allocations_in_measure),
       ENTRY(failing_allocations_of_every_operator), ENTRY(failing_allocations_of_clouds),
