@@ -3778,7 +3778,7 @@ struct tlsph_solver {
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
     tlsphi_rows rows;
     tlsph_real *row;         /* blocks of rows, see above */
-    tlsph_real *v, *grad_v;  /* velocity; grad v, rate_F but for sharp gradients. Both NULL: see tlsphi_take_turn */
+    tlsph_real *grad_v;      /* rate_F but for sharp gradients. Both NULL: see tlsphi_take_turn */
     int lanes;               /* fluxes by lanes, see [FLUXES] */
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
@@ -3831,10 +3831,19 @@ TLSPHI_INLINE void tlsphi_row_put(const tlsph_solver *s, int row, const int n, s
     tlsph_real *at = tlsphi_at(s, row, a);
     TLSPHI_UNROLL for (int i = 0; i < n; i++) at[(size_t)i * TLSPHI_ROW] = in[i];
 }
-/* Component of X_a, and d = X_b - X_a. */
+/* Component of X_a. */
 TLSPHI_INLINE tlsph_real tlsphi_X(const tlsph_solver *s, size_t a, size_t i) {
     return tlsphi_at(s, s->rows.X, a)[i * TLSPHI_ROW];
 }
+/* v_a as the rows hold it, a component and all: of the last evaluation, but for the mean velocities of leapfrogs. */
+TLSPHI_INLINE tlsph_real tlsphi_v(const tlsph_solver *s, size_t a, size_t i) {
+    return tlsphi_at(s, s->rows.v, a)[i * TLSPHI_ROW];
+}
+TLSPHI_INLINE void tlsphi_velocity(const tlsph_solver *s, size_t a, tlsph_real *out) {
+    if (s->dim == 3) tlsphi_row_get(s, s->rows.v, 3, a, out);
+    else tlsphi_row_get(s, s->rows.v, 2, a, out);
+}
+/* d = X_b - X_a */
 TLSPHI_INLINE void tlsphi_pair_arm(const tlsph_solver *s, size_t a, size_t b, const int dim, tlsph_real *d) {
     TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) d[i] = tlsphi_X(s, b, i) - tlsphi_X(s, a, i);
 }
@@ -4128,7 +4137,7 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const tlsph_real spread = s->metal ? tlsphi_largest_stretch_of_areas(pt) : 1;
     const tlsph_real wave[2] = {pt->c_p / spread, pt->c_s / spread};
-    tlsph_real P[9], H[9], PM[9], A[9], *v = s->v + D * a;
+    tlsph_real P[9], H[9], PM[9], A[9], v[3] = {0, 0, 0};
     tlsphi_shrink(dim, pt->P, P);
     tlsphi_shrink(dim, pt->H, H);
     for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++)
@@ -4360,8 +4369,8 @@ TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, siz
     const tlsph_real per_rho = 1 / m->rho;
     tlsph_real *row = tlsphi_at(s, 0, begin), good = 1;
     tlsphi_state_lanes x;
-    for (size_t i = 0; i < D * TLSPHI_LANES; i++) s->v[D * begin + i] = s->now.p[D * begin + i] * per_rho;
-    tlsphi_transpose(s->v + D * begin, D, x.v);
+    tlsphi_transpose(s->now.p + D * begin, D, x.v);
+    for (size_t i = 0; i < D * TLSPHI_LANES; i++) x.v[i] *= per_rho;
     x.F = s->now.F + dd * begin;
     x.H = s->has_H ? s->now.H + dd * begin : NULL;
     if (s->has_J) memcpy(x.J, s->now.J + begin, TLSPHI_LANES * sizeof *x.J);
@@ -4634,8 +4643,9 @@ static void tlsphi_stress_behind(const tlsph_solver *s, const tlsphi_held_part *
 static void tlsphi_held_jump(const tlsph_solver *s, const tlsphi_held_part *h, const tlsph_real *G, tlsph_real B,
                              const tlsph_real *arm, tlsph_real *jump) {
     const int dim = s->dim;
-    const tlsph_real *v = s->v + (size_t)dim * h->particle, deep = tlsphi_any_dot(dim, arm, h->N);
-    tlsph_real slope[3] = {0, 0, 0}, held[3] = {0, 0, 0};
+    const tlsph_real deep = tlsphi_any_dot(dim, arm, h->N);
+    tlsph_real v[3] = {0, 0, 0}, slope[3] = {0, 0, 0}, held[3] = {0, 0, 0};
+    tlsphi_velocity(s, h->particle, v);
     for (int i = 0; i < dim; i++) jump[i] = (h->wanted[i] - v[i]) * B - tlsphi_any_dot(dim, G + dim * i, arm);
     tlsphi_held_components(dim, h, jump);
     if (!h->mirror) return;
@@ -4989,7 +4999,7 @@ static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
         tlsph_real rest[3], Dv[3], Dw[3];
         for (size_t i = 0; i < D; i++) {
             rest[i] = s->rest[D * k + i] * half;
-            Dv[i] = s->v[D * b + i] - s->v[D * a + i];
+            Dv[i] = tlsphi_v(s, b, i) - tlsphi_v(s, a, i);
             Dw[i] = w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW];
             if (s->has_J)
                 tlsphi_at(s, r->slope_S, a)[i * TLSPHI_ROW] += (*tlsphi_at(s, r->S, b) - *tlsphi_at(s, r->S, a)) * rest[i];
@@ -5093,7 +5103,7 @@ static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *ima
     const size_t D = (size_t)s->dim, a = image->particle, axis = (size_t)image->axis;
     const tlsph_real factor = -image->c / s->V[a];
     tlsph_real odd[3] = {0, 0, 0};
-    memcpy(odd, s->v + D * a, D * sizeof *odd);
+    tlsphi_velocity(s, a, odd);
     tlsphi_odd_part(image, s->dim, odd);
     for (size_t i = 0; i < D; i++) {
         const size_t row = (D * i + axis) * TLSPHI_ROW;
@@ -5384,7 +5394,7 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
                                 const tlsphi_damp_side *side_b, const tlsph_real *C, const tlsph_real *c,
                                 tlsphi_damping *out, tlsph_real *heat) {
     const int dim = s->dim;
-    const size_t D = (size_t)dim, index[2] = {a, b};
+    const size_t index[2] = {a, b};
     const tlsphi_damp_side *given[2] = {side_a, side_b};
     tlsph_pair_side side[2];
     tlsph_pair_flux flux;
@@ -5400,7 +5410,7 @@ static void tlsphi_pair_printed(const tlsph_solver *s, size_t a, size_t b, const
         side[i].drift_ratio = given[i]->ratio;
         side[i].Sigma_J = given[i]->S;
         for (int k = 0; k < dim; k++) /* (66) has the rigid motion in it, (72) not */
-            side[i].velocity[k] = s->thermal == TLSPH_ENERGY ? s->v[D * q + (size_t)k] : given[i]->w[k];
+            side[i].velocity[k] = s->thermal == TLSPH_ENERGY ? tlsphi_v(s, q, (size_t)k) : given[i]->w[k];
     }
     for (int k = 0; k < dim; k++) {
         C3[k] = C[k];
@@ -5993,9 +6003,10 @@ static void tlsphi_load_values(tlsph_solver *s, tlsphi_load *load, double time) 
 /* Where the projection of this stage, which begins at x, sees a particle, and (next) where it takes it. Linear elasticity
    takes moments about the reference positions: there P is symmetric, not P F^T, and X x p is what is conserved. */
 TLSPHI_INLINE double tlsphi_next_position(const tlsph_solver *s, const tlsph_real *x, const tlsphi_stage *stage,
-                                          double dt, size_t at) {
+                                          double dt, size_t a, size_t i) {
+    const size_t at = (size_t)s->dim * a + i;
     const double was = (double)s->old.x[at];
-    return was + stage->b * ((double)x[at] - was) + stage->c * dt * (double)s->v[at];
+    return was + stage->b * ((double)x[at] - was) + stage->c * dt * (double)tlsphi_v(s, a, i);
 }
 TLSPHI_INLINE void tlsphi_stage_position(const tlsph_solver *s, const tlsph_real *x, const tlsphi_stage *stage,
                                          double dt, size_t a, double X[3]) {
@@ -6003,7 +6014,7 @@ TLSPHI_INLINE void tlsphi_stage_position(const tlsph_solver *s, const tlsph_real
     X[2] = 0;
     for (size_t i = 0; i < D; i++)
         X[i] = s->linear      ? (double)tlsphi_X(s, a, i)
-               : stage->ahead ? tlsphi_next_position(s, x, stage, dt, D * a + i)
+               : stage->ahead ? tlsphi_next_position(s, x, stage, dt, a, i)
                               : (double)x[D * a + i];
 }
 /* The arm z with which a force of this stage changes the angular momentum of the step. */
@@ -6011,11 +6022,13 @@ static void tlsphi_stage_arm(const tlsph_solver *s, const tlsphi_stage *stage, d
     const size_t D = (size_t)s->dim;
     const double rho = (double)tlsphi_material_of(s, a)->rho;
     z[2] = 0;
-    for (size_t i = 0, at = D * a; i < D; i++, at++)
+    for (size_t i = 0, at = D * a; i < D; i++, at++) {
+        const double v = (double)tlsphi_v(s, a, i);
         z[i] = s->linear ? stage->rate_weight * (double)tlsphi_X(s, a, i)
                          : stage->z_old * (double)s->old.x[at] +
-                               stage->z_next * tlsphi_next_position(s, s->now.x, stage, dt, at) +
-                               dt * (stage->z_was * (double)s->old.p[at] / rho + stage->z_is * (double)s->v[at]);
+                               stage->z_next * tlsphi_next_position(s, s->now.x, stage, dt, a, i) +
+                               dt * (stage->z_was * (double)s->old.p[at] / rho + stage->z_is * v);
+    }
 }
 
 /* Surface velocities of held parts at a time. */
@@ -6061,8 +6074,10 @@ static void tlsphi_push_particle(tlsph_solver *s, size_t a, const tlsph_real for
     const double share = stage->rate_weight * dt;
     tlsphi_account *account = &s->account;
     double z[3];
+    tlsph_real v[3] = {0, 0, 0};
     tlsphi_stage_arm(s, stage, dt, a, z);
-    const tlsph_real power = tlsphi_any_dot(s->dim, force, s->v + D * a);
+    tlsphi_velocity(s, a, v);
+    const tlsph_real power = tlsphi_any_dot(s->dim, force, v);
     for (size_t k = 0; k < D; k++) s->rate_p[D * a + k] += force[k] / s->V[a];
     account->external_work += share * (double)power;
     for (int k = 0; k < 3; k++) {
@@ -6130,9 +6145,10 @@ static void tlsphi_release_driven_power(tlsph_solver *s, tlsphi_load *load, cons
     const size_t D = (size_t)s->dim;
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
-        tlsph_real part[3];
+        tlsph_real v[3] = {0, 0, 0}, part[3];
         if (tlsphi_driven_behind(load, i)) continue;
-        tlsphi_driven_part(s->dim, &load->given, s->v + D * a, part);
+        tlsphi_velocity(s, a, v);
+        tlsphi_driven_part(s->dim, &load->given, v, part);
         const tlsph_real power = tlsphi_any_dot(s->dim, part, s->rate_p + D * a);
         load->before[i] = tlsphi_any_dot(s->dim, part, part) * tlsphi_material_of(s, a)->rho / 2;
         if (s->thermal == TLSPH_ENERGY && !s->leaps) s->rate_E[a] -= power;
@@ -6195,13 +6211,14 @@ static void tlsphi_apply_wall(tlsph_solver *s, const tlsphi_load *load, const tl
     for (size_t i = 0; i < load->given.count; i++) {
         const size_t a = load->inner[i];
         const double rho = (double)tlsphi_material_of(s, a)->rho;
-        tlsph_real gap[3] = {0, 0, 0}, *p = s->now.p + D * a;
+        tlsph_real v[3] = {0, 0, 0}, gap[3] = {0, 0, 0}, *p = s->now.p + D * a;
         for (size_t k = 0; k < D; k++) gap[k] = s->now.x[D * a + k] - load->given.point[k];
         const tlsph_real along = tlsphi_any_dot(s->dim, p, N);
         if (tlsphi_any_dot(s->dim, gap, N) > 0 || along >= 0) continue;
         for (size_t k = 0; k < D; k++) p[k] -= along * N[k];
+        tlsphi_velocity(s, a, v);
         const double was = (double)tlsphi_any_dot(s->dim, s->old.p + D * a, N) / rho,
-                     is = (double)tlsphi_any_dot(s->dim, s->v + D * a, N);
+                     is = (double)tlsphi_any_dot(s->dim, v, N);
         const double rate = (double)tlsphi_any_dot(s->dim, s->rate_p + D * a, N);
         const double held = rho / 2 * (stage->a * was * was + stage->b * is * is) +
                             stage->c * dt * is * rate * (s->leaps ? 0.5 : 1); /* leaps: the mean of v and 0 */
@@ -6323,7 +6340,7 @@ typedef struct tlsphi_arms {
     double X[3][TLSPHI_LANES], V[TLSPHI_LANES], f[3][TLSPHI_LANES];
 } tlsphi_arms;
 
-/* A vector field of the same particles. */
+/* A vector field of the same particles, and their v. */
 TLSPHI_INLINE void tlsphi_take_vectors(const tlsph_real *f, const size_t D, size_t begin, size_t end,
                                        double (*out)[TLSPHI_LANES]) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
@@ -6335,19 +6352,28 @@ TLSPHI_INLINE void tlsphi_take_vectors(const tlsph_real *f, const size_t D, size
     for (size_t a = begin; a < end; a++)
         for (size_t i = 0; i < D; i++) out[i][a - base] = (double)f[D * a + i];
 }
+TLSPHI_INLINE void tlsphi_take_velocities(const tlsph_solver *s, const size_t D, size_t begin, size_t end,
+                                          double (*out)[TLSPHI_LANES]) {
+    const size_t first = begin % TLSPHI_LANES;
+    const tlsph_real *v = tlsphi_at(s, s->rows.v, begin - first);
+    for (size_t i = 0; i < D; i++, v += TLSPHI_ROW) {
+        if (end - begin == TLSPHI_LANES) for (size_t l = 0; l < TLSPHI_LANES; l++) out[i][l] = (double)v[l];
+        else for (size_t l = first; l < first + end - begin; l++) out[i][l] = (double)v[l];
+    }
+}
 /* The arms of a whole tile, as tlsphi_projection_arm. dim and ahead are constants. */
 TLSPHI_INLINE void tlsphi_tile_arms(const tlsphi_projection *p, const double origin[3], const int dim, const int ahead,
                                     size_t base, tlsphi_arms *out) {
     const tlsph_solver *s = p->s;
     const size_t D = (size_t)dim;
-    const tlsph_real *x = p->x + D * base, *old = s->old.x + D * base, *v = s->v + D * base;
-    const tlsph_real *X = tlsphi_at(s, s->rows.X, base);
+    const tlsph_real *x = p->x + D * base, *old = s->old.x + D * base;
+    const tlsph_real *v = tlsphi_at(s, s->rows.v, base), *X = tlsphi_at(s, s->rows.X, base);
     const double B = p->stage.b, C = p->stage.c * p->dt, from[3] = {origin[0], origin[1], dim == 3 ? origin[2] : 0};
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         out->V[l] = (double)s->V[base + l];
         TLSPHI_UNROLL for (size_t i = 0; i < D; i++) {
             const double is = (double)x[D * l + i], was = (double)old[D * l + i];
-            out->X[i][l] = (ahead ? was + B * (is - was) + C * (double)v[D * l + i] : is) - from[i];
+            out->X[i][l] = (ahead ? was + B * (is - was) + C * (double)v[i * TLSPHI_ROW + l] : is) - from[i];
         }
     }
     for (size_t i = 0; i < 3; i++)
@@ -6390,9 +6416,9 @@ TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia,
         }
     }
 }
-/* Moments of a vector field over a block: its lanes are added in order at the end. */
-TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const tlsph_real *field,
-                                        const int with_inertia) {
+/* Moments of v with the inertia, or of dp/dt, over a block: its lanes are added in order at the end. */
+TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const int of_v) {
+    const tlsph_solver *s = p->s;
     double m[TLSPHI_MOMENTS][TLSPHI_LANES], origin[3];
     tlsphi_arms arms;
     memset(m, 0, sizeof m);
@@ -6400,25 +6426,25 @@ TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block
     for (size_t begin = block->begin, end; begin < block->end; begin = end) {
         end = tlsphi_tile_end(block, begin);
         tlsphi_take_arms(p, origin, begin, end, &arms);
-        if (p->s->dim == 3) tlsphi_take_vectors(field, 3, begin, end, arms.f);
-        else tlsphi_take_vectors(field, 2, begin, end, arms.f);
-        tlsphi_add_arms(&arms, with_inertia, m);
+        if (of_v) tlsphi_take_velocities(s, (size_t)s->dim, begin, end, arms.f);
+        else if (s->dim == 3) tlsphi_take_vectors(s->rate_p, 3, begin, end, arms.f);
+        else tlsphi_take_vectors(s->rate_p, 2, begin, end, arms.f);
+        tlsphi_add_arms(&arms, of_v, m);
     }
     for (int k = 0; k < TLSPHI_MOMENTS; k++) {
         block->moments[k] = 0;
         for (size_t l = 0; l < TLSPHI_LANES; l++) block->moments[k] += m[k][l];
     }
 }
-/* Moments of v. */
 static void tlsphi_rigid_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
-    tlsphi_block_moments(p, p->s->block + i, p->s->v, 1);
+    tlsphi_block_moments(p, p->s->block + i, 1);
 }
 /* Sums of T | X x T, from the same moments. */
 static void tlsphi_torque_task(void *arg, size_t i) {
     const tlsphi_projection *p = (const tlsphi_projection *)arg;
     tlsphi_block *block = p->s->block + i;
-    tlsphi_block_moments(p, block, p->s->rate_p, 0);
+    tlsphi_block_moments(p, block, 0);
     for (int k = 0; k < 6; k++) block->moments[k] = block->moments[10 + k];
 }
 /* x with I x = moment, within the turns that the body's mirror planes allow. */
@@ -6495,9 +6521,9 @@ static void tlsphi_relative_task(void *arg, size_t i) {
         tlsphi_rigid_lanes(body->spin, body->v_mean, &arms);
         for (size_t k = 0; k < D; k++) {
             const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
+            const tlsph_real *v = tlsphi_at(s, s->rows.v + (int)k, base);
             tlsph_real *w = tlsphi_at(s, s->rows.w + (int)k, base);
-            for (size_t a = begin; a < end; a++)
-                w[a - base] = (tlsph_real)((double)s->v[D * a + k] - arms.f[k][a - base]);
+            for (size_t l = begin - base; l < end - base; l++) w[l] = (tlsph_real)((double)v[l] - arms.f[k][l]);
         }
     }
 }
@@ -6551,7 +6577,7 @@ static void tlsphi_settle_energy_task(void *arg, size_t i) {
         tlsphi_projection_arm(p, centre, a, X);
         tlsphi_cross3(body->lambda, X, turn);
         for (int k = 0; k < s->dim; k++) {
-            const double relative = (double)s->v[(size_t)s->dim * a + (size_t)k] - body->v_mean[k];
+            const double relative = (double)tlsphi_v(s, a, (size_t)k) - body->v_mean[k];
             s->rate_E[a] -= (tlsph_real)((turn[k] + body->linear[k]) * relative);
         }
     }
@@ -6714,7 +6740,6 @@ static void tlsphi_pressure_prepare_task(void *arg, size_t i) {
             gain = tlsphi_dot((int)dd, H, G);
         }
         s->pressure.b[a] = s->V[a] * ((pt.d - 1) / (tlsph_real)q->T + gain);
-        for (size_t k = 0; k < D; k++) s->v[D * a + k] = s->now.p[D * a + k] / m->rho;
     }
 }
 /* k_ab of R */
@@ -6986,7 +7011,8 @@ static tlsph_result tlsphi_pressure_solve(tlsph_solver *s, const tlsphi_stage *s
     tlsphi_run_tasks(s, tlsphi_pressure_prepare_task, &q);
     tlsphi_run_tasks(s, tlsphi_pressure_diagonal_task, &q);
     tlsphi_pressure_accelerate(&q, s->now.q, u->a); /* for its gradient */
-    tlsphi_pressure_terms(&q, s->now.q, s->v, 1, u->r);
+    for (size_t i = 0; i < D * s->n; i++) u->a[i] = s->now.p[i] / tlsphi_material_of(s, i / D)->rho;
+    tlsphi_pressure_terms(&q, s->now.q, u->a, 1, u->r);
     for (size_t a = 0; a < s->n; a++) {
         u->r[a] = u->b[a] - u->r[a];
         u->q[a] = 0;
@@ -7277,14 +7303,44 @@ static const tlsphi_block *tlsphi_conduct(tlsph_solver *s, double time, double d
    a step w may turn against T_D, so that a share, and the production of a pair, may be negative by O(dt) of itself. */
 
 /* The rate of the kinetic part of E, v . dp/dt: all forces are in rate_p by now. */
-static void tlsphi_add_kinetic_rate(tlsph_solver *s, size_t a) {
-    const size_t D = (size_t)s->dim;
-    s->rate_E[a] += tlsphi_dot(s->dim, s->v + D * a, s->rate_p + D * a);
+TLSPHI_INLINE void tlsphi_kinetic_rate_tile(tlsph_solver *s, size_t begin, const size_t count, const int dim) {
+    const tlsph_real *v = tlsphi_at(s, s->rows.v, begin), *force = s->rate_p + (size_t)dim * begin;
+    tlsph_real *rate = s->rate_E + begin;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < count; l++) {
+        tlsph_real own[3] = {0};
+        tlsphi_take_rows(dim, v + l, own);
+        rate[l] += tlsphi_dot(dim, own, force + (size_t)dim * l);
+    }
+}
+static void tlsphi_add_kinetic_rate(tlsph_solver *s, const tlsphi_block *block) {
+    for (size_t a = block->begin, end; a < block->end; a = end) {
+        end = tlsphi_tile_end(block, a);
+        if (end - a < TLSPHI_LANES) tlsphi_kinetic_rate_tile(s, a, end - a, s->dim);
+        else if (s->dim == 3) tlsphi_kinetic_rate_tile(s, a, TLSPHI_LANES, 3);
+        else tlsphi_kinetic_rate_tile(s, a, TLSPHI_LANES, 2);
+    }
 }
 /* now = a old + b u + c dt rate over the entries [begin, end), written so that a + b = 1 has no round-off. */
-static void tlsphi_combine(tlsph_real *now, const tlsph_real *old, const tlsph_real *u, const tlsph_real *rate,
-                           size_t begin, size_t end, tlsph_real B, tlsph_real C) {
-    for (size_t i = begin; i < end; i++) now[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
+TLSPHI_INLINE void tlsphi_combine(tlsph_real *now, const tlsph_real *old, const tlsph_real *u, const tlsph_real *rate,
+                                  size_t begin, size_t end, tlsph_real B, tlsph_real C) {
+    TLSPHI_EACH_LANE for (size_t i = begin; i < end; i++) now[i] = old[i] + B * (u[i] - old[i]) + C * rate[i];
+}
+/* The same for x, whose rate lies in the rows of v. */
+TLSPHI_INLINE void tlsphi_move_tile(tlsph_solver *s, const tlsph_real *u_x, size_t begin, const size_t count,
+                                    const size_t D, tlsph_real B, tlsph_real C) {
+    const tlsph_real *row = tlsphi_at(s, s->rows.v, begin);
+    tlsph_real v[3 * TLSPHI_LANES];
+    TLSPHI_EACH_LANE for (size_t l = 0; l < count; l++)
+        TLSPHI_UNROLL for (size_t i = 0; i < D; i++) v[D * l + i] = row[i * TLSPHI_ROW + l];
+    tlsphi_combine(s->now.x + D * begin, s->old.x + D * begin, u_x + D * begin, v, 0, D * count, B, C);
+}
+static void tlsphi_move(tlsph_solver *s, const tlsph_real *u_x, const tlsphi_block *block, tlsph_real B, tlsph_real C) {
+    for (size_t a = block->begin, end; a < block->end; a = end) {
+        end = tlsphi_tile_end(block, a);
+        if (end - a < TLSPHI_LANES) tlsphi_move_tile(s, u_x, a, end - a, (size_t)s->dim, B, C);
+        else if (s->dim == 3) tlsphi_move_tile(s, u_x, a, TLSPHI_LANES, 3, B, C);
+        else tlsphi_move_tile(s, u_x, a, TLSPHI_LANES, 2, B, C);
+    }
 }
 /* The same for F and, where it is evolved, H, of the lanes [first, last) of the tile at `base`: dF/dt = grad v and
    dH/dt = F x grad v with F of state u. `from` and `turn`: grad v, or grad w and the spin that it lacks. */
@@ -7357,8 +7413,8 @@ static void tlsphi_update_task(void *arg, size_t i) {
     const tlsph_real B = up->B, C = up->C;
     const tlsphi_state *u = up->u;
     if (up->projection->leaves) tlsphi_correct_task(up->projection, i);
-    for (size_t a = begin; s->thermal == TLSPH_ENERGY && a < end; a++) tlsphi_add_kinetic_rate(s, a);
-    tlsphi_combine(s->now.x, s->old.x, u->x, s->v, D * begin, D * end, B, C);
+    if (s->thermal == TLSPH_ENERGY) tlsphi_add_kinetic_rate(s, s->block + i);
+    tlsphi_move(s, u->x, s->block + i, B, C);
     tlsphi_combine(s->now.p, s->old.p, u->p, s->rate_p, D * begin, D * end, B, C);
     tlsphi_deform(s, u, s->block + i, B, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, u->J, s->rate_J, begin, end, B, C);
@@ -7568,9 +7624,9 @@ typedef struct tlsphi_leap_move {
 static void tlsphi_drift_task(void *arg, size_t i) {
     const tlsphi_leap_move *drift = (const tlsphi_leap_move *)arg;
     tlsph_solver *s = drift->s;
-    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
+    const size_t begin = s->block[i].begin, end = s->block[i].end;
     const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
-    tlsphi_combine(s->now.x, s->old.x, s->now.x, s->v, D * begin, D * end, 0, C);
+    tlsphi_move(s, s->now.x, s->block + i, 0, C);
     tlsphi_deform(s, &s->now, s->block + i, 0, C);
     if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, on, C);
     if (s->thermal == TLSPH_ENERGY || (s->thermal && drift->on))
@@ -7592,7 +7648,7 @@ static void tlsphi_mean_velocity_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
     for (size_t a = block->begin; a < block->end; a++) {
         const tlsph_real half = 1 / (2 * tlsphi_material_of(s, a)->rho);
-        tlsph_real *v = s->v + D * a;
+        tlsph_real v[3] = {0, 0, 0};
         for (size_t k = 0; k < D; k++) v[k] = half * (s->old.p[D * a + k] + s->now.p[D * a + k]);
         tlsphi_row_put(s, s->rows.v, s->dim, a, v);
         if (!s->projection) tlsphi_row_put(s, s->rows.w, s->dim, a, v);
@@ -7612,7 +7668,7 @@ static void tlsphi_mean_work_block(tlsph_solver *s, tlsphi_block *block) {
         block->sums[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)(heat / theta);
         if (s->thermal == TLSPH_ENTROPY) s->rate_E[a] = s->dissipation_heats ? density / theta : 0;
         else s->rate_E[a] += density;
-        for (size_t k = 0; s->thermal == TLSPH_ENERGY && k < D; k++) s->now.E[a] += s->v[D * a + k] * (p[k] - old[k]);
+        for (size_t k = 0; s->thermal == TLSPH_ENERGY && k < D; k++) s->now.E[a] += tlsphi_v(s, a, k) * (p[k] - old[k]);
     }
 }
 /* The work of loads has been taken with v^n: the rest of that with m. */
@@ -7627,7 +7683,7 @@ static void tlsphi_mean_work_of_loads(tlsph_solver *s, double dt) {
             const tlsph_real *rate = s->rate_p + D * a;
             tlsph_real change[3] = {0, 0, 0}, force[3] = {0, 0, 0};
             for (size_t l = 0; l < D; l++)
-                change[l] = s->v[D * a + l] - s->old.p[D * a + l] / tlsphi_material_of(s, a)->rho;
+                change[l] = tlsphi_v(s, a, l) - s->old.p[D * a + l] / tlsphi_material_of(s, a)->rho;
             if (kind == TLSPH_VELOCITY) {
                 tlsphi_driven_part(s->dim, &load->given, rate, force);
                 for (size_t l = 0; l < D; l++) force[l] *= -s->V[a];
@@ -9365,7 +9421,6 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     const size_t D = (size_t)s->dim, n = s->n;
     s->rate_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
     if (s->keeps_rate) s->rate_F = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D));
-    s->v = TLSPHI_TAKE(arena, tlsph_real, D * n);
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D)) : s->rate_F;
     if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
