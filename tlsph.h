@@ -4068,6 +4068,14 @@ static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state 
                                                                                                : TLSPH_ERROR_NOT_FINITE;
 }
 
+/* The same of a state that was evaluated without fault: lanes round otherwise, and may have found the least bit of heat
+   where there is none here. */
+static void tlsphi_constitute_again(const tlsph_solver *s, size_t a, tlsphi_point *pt) {
+    if (tlsphi_constitute(s, &s->now, a, NULL, pt) != TLSPH_ERROR_TEMPERATURE) return;
+    const tlsph_real theta = *tlsphi_theta(s, a);
+    tlsphi_conclude(tlsphi_material_of(s, a), theta, s->now.q ? s->now.q[a] : pt->r.e_J - theta * pt->r.eta_J, pt);
+}
+
 /* One callback for the run of particles [begin, end) that share a user's material. */
 static void tlsphi_user_responses(const tlsph_solver *s, size_t begin, size_t end, tlsph_response *out) {
     tlsph_real F[9 * TLSPHI_LANES], J[TLSPHI_LANES];
@@ -8151,7 +8159,7 @@ static void tlsphi_ledger_particle(const tlsph_solver *s, size_t a, tlsph_ledger
     const double V = (double)s->V[a];
     double x[3] = {0, 0, 0}, p[3] = {0, 0, 0}, arm[3] = {0, 0, 0}, xp[3];
     tlsphi_point pt;
-    tlsphi_constitute(s, &s->now, a, NULL, &pt);
+    tlsphi_constitute_again(s, a, &pt);
     for (size_t i = 0; i < D; i++) {
         x[i] = (double)s->now.x[D * a + i];
         p[i] = V * (double)s->now.p[D * a + i];
@@ -8330,7 +8338,7 @@ static tlsph_real tlsphi_von_mises(const tlsphi_point *pt, tlsph_real volume) {
 static void tlsphi_read_derived(const tlsph_solver *s, size_t a, tlsph_field field, tlsph_real *out) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     tlsphi_point pt;
-    tlsphi_constitute(s, &s->now, a, NULL, &pt);
+    tlsphi_constitute_again(s, a, &pt);
     const tlsph_real weight = m->entropic ? pt.theta / m->theta_R : 1, volume = m->kind == TLSPH_LINEAR ? 1 : pt.J;
     const tlsph_real internal = pt.r.energy + (s->thermal ? m->c_v * (pt.theta - m->theta_R) : 0);
     const tlsph_real entropy = pt.r.entropy + (s->thermal ? m->c_v * tlsphi_log(pt.theta / m->theta_R) : 0);
