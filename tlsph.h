@@ -418,7 +418,8 @@ typedef struct tlsph_desc {
                                             stages of its own in each half step (see SUPER-STEPS) */
     int sharp_gradients;                 /* 1: fourth-order dispersion on lattices, twice the cost; default 0. Needs an
                                             antisymmetric operator: cells, given, or a box lattice with support 0.6 */
-    int tight_closure;                   /* 1: TLSPH_CLOSED exact for linear fields to 1e-3, not 2e-2, at ten times the cost; default 0 */
+    int tight_closure;                   /* 1: TLSPH_CLOSED exact for linear fields to 1e-3, not 2e-2, at ten times
+                                            the cost; default 0 */
     int mirror_gradients;                /* 1: gradients know rollers and tangent planes; default 1 */
     int dissipation_heats;               /* entropy form: 1 = dissipated work becomes entropy (default), 0 = S_eta = 0 */
     int projection;                      /* 1: keeps angular momentum (000-79 to 82); default 1. 0: [PROJECTION] */
@@ -1723,8 +1724,8 @@ static size_t tlsphi_closed_neighbours(const tlsphi_plan *plan, size_t a, uint32
    parts operator (Strand 1994): there second order, everywhere antisymmetric, closed by the end's area, exact for linear
    fields. At a roller or tangentially fixed face the line goes on as its mirror image, and the order stays.
 
-   Voxel bodies. Every plane at which the cross-section or the cells' size changes cuts the whole lattice; between cuts the body is a set of full
-   boxes. A box has the tensor product of its lines' operators (C along x: 2 Q_x H_y H_z areas), and V, C and B of boxes
+   Voxel bodies. Every plane at which the cross-section or the cells' size changes cuts the whole lattice; between cuts the
+   body is a set of full boxes. A box has the tensor product of its lines' operators (C along x: 2 Q_x H_y H_z areas), and V, C and B of boxes
    that meet add up: faces that meet are whole and have equal weights H_y H_z, because both boxes share the intervals of
    the other axes. So all properties carry over, re-entrant edges included; at a cut the order is that of a free end.
    Intervals that are too short for this (less than 7 cells; with a mirror 4, between two 3) have H = 1/2, 1, 1, ... and
@@ -7546,7 +7547,9 @@ static tlsph_result tlsphi_describe_failure(tlsph_solver *s, const tlsphi_block 
         if (!cause) cause = tlsphi_cause_of_cold(s, a, &pt);
     } else if (!cause) {
         tlsph_real d;
-        cause = tlsphi_squeeze_before(s, a, &d) < 0.01 ? TLSPHI_SQUEEZED : "a load, a drive or a user's material gave no finite number, or values have run away";
+        cause = tlsphi_squeeze_before(s, a, &d) < 0.01
+                    ? TLSPHI_SQUEEZED
+                    : "a load, a drive or a user's material gave no finite number, or values have run away";
     }
     tlsphi_fail(&s->error, block->failure, stage, field, s->host[a], value, 0, allowed);
     tlsphi_add_cause(s, a, &pt, cause);
