@@ -1489,8 +1489,8 @@ typedef struct tlsphi_slot {
 /* Magnitudes of pair vectors, each of which stands for all that differ from it by the round-off of positions. */
 #define TLSPHI_MAGNITUDES_SEEN 4096
 typedef struct tlsphi_magnitudes {
-    double value[TLSPHI_MAGNITUDES_SEEN / 4]; /* in the order of their coming */
-    uint16_t seen[TLSPHI_MAGNITUDES_SEEN];    /* hash table by value/slack, number + 1 */
+    double value[TLSPHI_MAGNITUDES_SEEN / 4], cell[TLSPHI_MAGNITUDES_SEEN / 4]; /* as they came; floor(value/slack) */
+    uint16_t seen[TLSPHI_MAGNITUDES_SEEN]; /* hash table by cells, number + 1 */
     unsigned count;
     double slack;
 } tlsphi_magnitudes;
@@ -1971,7 +1971,7 @@ static tlsph_result tlsphi_fourth_build(tlsphi_plan *plan) {
 
 /* What round-off of the positions may change in a pair vector of length 1, in M_a, or in lengths over h. */
 static double tlsphi_position_slack(const tlsphi_plan *plan) {
-    double reach = 0;
+    double reach = 1;
     for (size_t i = 0; i < 3 * plan->n; i++)
         if (i % 3 < (size_t)plan->dim) reach = tlsphi_dmax(reach, fabs((double)tlsphi_position(plan, 0)[i]) / plan->h);
     return tlsphi_dmin(4 * reach, 256) * TLSPHI_EPSILON;
@@ -1989,11 +1989,12 @@ static double tlsphi_common_magnitude(tlsphi_magnitudes *m, double x) {
         memcpy(&bits, &key, sizeof bits);
         at = (size_t)(bits * 0x9e3779b97f4a7c15u >> 52);
         for (; (found = m->seen[at]) > 0; at = (at + 1) % TLSPHI_MAGNITUDES_SEEN)
-            if (floor(m->value[found - 1] / m->slack) == key) break;
+            if (m->cell[found - 1] == key) break;
         if (found && fabs(m->value[found - 1] - x) <= m->slack && (!number || found < number)) number = found;
     }
     if (number) return m->value[number - 1];
     if (m->count == TLSPHI_MAGNITUDES_SEEN / 4) return x;
+    m->cell[m->count] = cell;
     m->value[m->count++] = x;
     m->seen[at] = (uint16_t)m->count;
     return x;
@@ -2004,13 +2005,15 @@ static void tlsphi_round_vectors(const tlsphi_plan *plan, double *g, size_t real
     const double quantum = (plan->dim == 3 ? plan->h * plan->h : plan->h) * (TLSPHI_EPSILON > 1e-10 ? 1e-6 : 1e-14);
     for (size_t i = 0; i < reals; i++) {
         const double rounded = floor(fabs(g[i]) / quantum + 0.5) * quantum;
-        g[i] = (g[i] < 0 ? -1 : 1) * tlsphi_common_magnitude(plan->magnitudes, rounded);
+        if (rounded > 0) g[i] = (g[i] < 0 ? -1 : 1) * tlsphi_common_magnitude(plan->magnitudes, rounded);
+        else g[i] = rounded;
     }
 }
 static tlsph_result tlsphi_start_rounding(tlsphi_plan *plan) {
     plan->magnitudes = TLSPHI_SCRATCH(plan, tlsphi_magnitudes, 1);
     if (!plan->magnitudes) return tlsphi_no_memory(plan, (double)sizeof(tlsphi_magnitudes));
     plan->magnitudes->slack = tlsphi_position_slack(plan) * (plan->dim == 3 ? plan->h * plan->h : plan->h);
+    tlsphi_common_magnitude(plan->magnitudes, 0); /* the first: what is nearly 0 is 0 */
     return TLSPH_OK;
 }
 static size_t tlsphi_neighbours_of(const tlsphi_plan *plan, size_t a, uint32_t *list, double *g) {
