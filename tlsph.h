@@ -911,8 +911,8 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_APART static
 #endif
 
-/* Asks for memory that is read or written soon; tcc calls itself gcc, too, but has no such request. */
-#if defined(__GNUC__) && !defined(__TINYC__)
+/* Asks for memory that is read or written soon. */
+#if defined(__GNUC__) || defined(__clang__)
 #define TLSPHI_PREFETCH(address) __builtin_prefetch(address)
 #else
 #define TLSPHI_PREFETCH(address) ((void)(address))
@@ -1724,10 +1724,11 @@ static size_t tlsphi_closed_neighbours(const tlsphi_plan *plan, size_t a, uint32
    parts operator (Strand 1994): there second order, everywhere antisymmetric, closed by the end's area, exact for linear
    fields. At a roller or tangentially fixed face the line goes on as its mirror image, and the order stays.
 
-   Voxel bodies. Every plane at which the cross-section or the cells' size changes cuts the whole lattice; between cuts the
-   body is a set of full boxes. A box has the tensor product of its lines' operators (C along x: 2 Q_x H_y H_z areas), and V, C and B of boxes
-   that meet add up: faces that meet are whole and have equal weights H_y H_z, because both boxes share the intervals of
-   the other axes. So all properties carry over, re-entrant edges included; at a cut the order is that of a free end.
+   Voxel bodies. Every plane at which the cross-section or the cells' size changes cuts the whole lattice; between cuts
+   the body is a set of full boxes. A box has the tensor product of its lines' operators (C along x: 2 Q_x H_y H_z
+   areas), and V, C and B of boxes that meet add up: faces that meet are whole and have equal weights H_y H_z, because
+   both boxes share the intervals of the other axes. So all properties carry over, re-entrant edges included; at a cut
+   the order is that of a free end.
    Intervals that are too short for this (less than 7 cells; with a mirror 4, between two 3) have H = 1/2, 1, 1, ... and
    Q = 1/2, for all boxes in them: a body of short intervals, say a ball of voxels, gets TLSPH_CELLS.
 
@@ -1979,7 +1980,7 @@ static double tlsphi_position_slack(const tlsphi_plan *plan) {
 /* The first of the magnitudes that is within the slack of x; x itself, if there is none, is one from then on, while there
    is room. So an x stands for the same whenever it is asked for. */
 static double tlsphi_common_magnitude(tlsphi_magnitudes *m, double x) {
-    const double cell = floor(x / m->slack); /* holds one at most, as all in it are within the slack of each other */
+    const double cell = floor(x / m->slack); /* holds one at most: all in it are within the slack of each other */
     size_t at = 0;
     unsigned number = 0;
     for (int i = 0; i < 3; i++) {
@@ -1990,7 +1991,8 @@ static double tlsphi_common_magnitude(tlsphi_magnitudes *m, double x) {
         at = (size_t)(bits * 0x9e3779b97f4a7c15u >> 52);
         for (; (found = m->seen[at]) > 0; at = (at + 1) % TLSPHI_MAGNITUDES_SEEN)
             if (m->cell[found - 1] == key) break;
-        if (found && fabs(m->value[found - 1] - x) <= m->slack && (!number || found < number)) number = found;
+        const int fits = found && (i == 2 || fabs(m->value[found - 1] - x) <= m->slack);
+        if (fits && (!number || found < number)) number = found;
     }
     if (number) return m->value[number - 1];
     if (m->count == TLSPHI_MAGNITUDES_SEEN / 4) return x;
@@ -10429,7 +10431,7 @@ typedef struct tlsphi_voronoi {
     size_t bins[3], *bin_first;
     uint32_t *bin_facet, *stamp, stamped;
     double *near_r;        /* candidates of one particle */
-    uint32_t *near;
+    uint32_t *nearest;
     size_t near_capacity;
     tlsphi_split_level *level;
 } tlsphi_voronoi;
@@ -10521,20 +10523,20 @@ static size_t tlsphi_near(tlsphi_voronoi *v, size_t a, double reach) {
                     const double rr = tlsphi_dot3(d, d);
                     if (grid->order[i] == a || rr >= reach * reach || found >= v->near_capacity) continue;
                     v->near_r[found] = rr;
-                    v->near[found++] = grid->order[i];
+                    v->nearest[found++] = grid->order[i];
                 }
             }
     for (size_t gap = found / 2; gap > 0; gap /= 2) /* Shell sort */
         for (size_t i = gap; i < found; i++) {
             const double rr = v->near_r[i];
-            const uint32_t b = v->near[i];
+            const uint32_t b = v->nearest[i];
             size_t j = i;
-            for (; j >= gap && (v->near_r[j - gap] > rr || (v->near_r[j - gap] == rr && v->near[j - gap] > b)); j -= gap) {
+            for (; j >= gap && (v->near_r[j - gap] > rr || (v->near_r[j - gap] == rr && v->nearest[j - gap] > b)); j -= gap) {
                 v->near_r[j] = v->near_r[j - gap];
-                v->near[j] = v->near[j - gap];
+                v->nearest[j] = v->nearest[j - gap];
             }
             v->near_r[j] = rr;
-            v->near[j] = b;
+            v->nearest[j] = b;
         }
     return found;
 }
@@ -10575,7 +10577,7 @@ static tlsphi_poly *tlsphi_voronoi_cell(tlsphi_voronoi *v, size_t a, double spac
         double radius = tlsphi_poly_radius(now);
         for (; done < found && v->near_r[done] < 4 * radius * radius; done++) {
             double plane[4], least, most;
-            tlsphi_difference(&v->plan, a, v->near[done], plane);
+            tlsphi_difference(&v->plan, a, v->nearest[done], plane);
             const double r = sqrt(v->near_r[done]);
             for (int k = 0; k < 3; k++) plane[k] /= r;
             plane[3] = r / 2;
@@ -10950,10 +10952,10 @@ static tlsph_result tlsphi_voronoi_begin(tlsphi_voronoi *v, const tlsphi_mesh *m
     const tlsph_result r = tlsphi_grid_build(&v->plan);
     if (r) return r;
     v->near_capacity = p->count < 65536 ? p->count : 65536;
-    v->near = TLSPHI_SCRATCH(&v->plan, uint32_t, v->near_capacity);
+    v->nearest = TLSPHI_SCRATCH(&v->plan, uint32_t, v->near_capacity);
     v->near_r = TLSPHI_SCRATCH(&v->plan, double, v->near_capacity);
     v->level = TLSPHI_SCRATCH(&v->plan, tlsphi_split_level, TLSPHI_SPLITS + 5);
-    return v->near && v->near_r && v->level ? tlsphi_voronoi_bins(v, m, most)
+    return v->nearest && v->near_r && v->level ? tlsphi_voronoi_bins(v, m, most)
                                             : tlsphi_no_memory(&v->plan, 1e7);
 }
 TLSPHI_DEF tlsph_result tlsph_voronoi(int dimension, const tlsph_particles *particles, const tlsph_surface *surface,

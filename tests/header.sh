@@ -13,9 +13,13 @@ c_only="-Wstrict-prototypes"
 
 # ---- the units that are compiled ----
 
-# The implementation, with the header before, after and again.
+# The implementation, with the header before, after and again, and what windows.h makes of four names.
 cat > "$work/whole.c" <<'END'
 #include "tlsph.h"
+#define near
+#define far
+#define small char
+#define interface struct
 #define TLSPH_IMPLEMENTATION
 #include "tlsph.h"
 #include "tlsph.h"

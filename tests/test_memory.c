@@ -662,7 +662,8 @@ TEST(destroying_nothing)
 }
 
 SUITE(memory, ENTRY(every_unknown_adds_bytes), ENTRY(heat_adds_bytes), ENTRY(two_dimensions_need_less),
-      ENTRY(leanest_scene_is_lean), ENTRY(rounded_lattices_share_their_pairs), ENTRY(pairs_are_kept_on_request), ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
+      ENTRY(leanest_scene_is_lean), ENTRY(rounded_lattices_share_their_pairs), ENTRY(pairs_are_kept_on_request),
+      ENTRY(measured_size_is_the_size_taken), ENTRY(isothermal_scenes_have_no_energy),
       ENTRY(field_table), ENTRY(callers_memory_is_used), ENTRY(callers_memory_too_small),
       ENTRY(failing_allocations_leak_nothing), ENTRY(failing_allocations_in_measure),
       ENTRY(failing_allocations_of_every_operator), ENTRY(failing_allocations_of_clouds),
