@@ -924,12 +924,13 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #else
 #define TLSPHI_UNROLL
 #endif
-/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. clang complains
-   where it is told not to optimise and so does not make vectors of them. */
+/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. clang would
+   unroll short ones before it looks for vectors, and then find few; and it complains where it is told not to optimise
+   and so does not make vectors of them. */
 #if defined(__clang__)
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
-#define TLSPHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#define TLSPHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #elif defined(__GNUC__) && __GNUC__ >= 8
 #define TLSPHI_EACH_LANE _Pragma("GCC ivdep")
 #else
@@ -4261,19 +4262,21 @@ TLSPHI_INLINE void tlsphi_transpose(const tlsph_real *from, const size_t n, tlsp
     for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
 }
-/* Takes F and H from the lanes, completed in plane strain; H = cof F where it is not evolved. */
+/* Takes F and H from the lanes, completed in plane strain; H = cof F where it is not evolved. d is a
+   number of its own: clang turns a choice between two members into one of addresses, and then makes no vectors. */
 TLSPHI_INLINE void tlsphi_take_measures(const tlsphi_state_lanes *x, size_t l, const int dim, const int has_H, int has_J,
                                         tlsphi_point *pt) {
     tlsph_real F[9], H[9];
     TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) F[i] = x->F[(size_t)i * TLSPHI_LANES + l];
     tlsphi_expand(dim, F, 1, pt->F);
     tlsphi_cofactor_inline(pt->F, pt->H);
-    pt->d = pt->F[0] * pt->H[0] + pt->F[1] * pt->H[1] + pt->F[2] * pt->H[2];
+    const tlsph_real d = pt->F[0] * pt->H[0] + pt->F[1] * pt->H[1] + pt->F[2] * pt->H[2];
     if (has_H) {
         TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) H[i] = x->H[(size_t)i * TLSPHI_LANES + l];
-        tlsphi_expand(dim, H, pt->d, pt->H);
+        tlsphi_expand(dim, H, d, pt->H);
     }
-    pt->J = has_J ? x->J[l] : pt->d;
+    pt->d = d;
+    pt->J = has_J ? x->J[l] : d;
 }
 /* Writes the rows of a tile at `row`, c_p, and whether all is well. dim, has_H, entropic, mooney are constants. */
 TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_material *given, tlsphi_state_lanes *x,
