@@ -1,6 +1,6 @@
 # GNU make. Needs cc and make only; everything else (OpenMP, clang, C++, valgrind, nm) is looked for and used if present.
 #
-#   make            examples -> build/<example>         make test    unit and physics tests, about 4 minutes
+#   make            examples -> build/<example>         make test    unit and physics tests, 2 minutes
 #   make demo       the L-shaped block                  make check   test and the slow ones, sanitizers, valgrind
 #   make bench      timings and short study, 10 min     make bench-full    the whole study, 2 hours
 #   make extremes   how far it goes, a table, 6 min     make coverage, make clean
@@ -116,9 +116,10 @@ build/suites.h: FORCE
 
 QUICK := $(filter-out physics%,$(TOPICS))
 SKIPPED = echo "$(1)"; echo "0 passed, 0 failed, 1 skipped"
-FAST_STEPS := "build/test_double" "build/test_float" "CC='$(CC)' sh tests/header.sh"
+HEADER = "CC='$(CC)' sh tests/header.sh$(1)"
+FAST_STEPS := "build/test_double" "build/test_float"
 SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
-SLOW_STEPS := "build/test_double --slow" "build/test_fast_math" \
+SLOW_STEPS := $(call HEADER, --optimised) "build/test_double --slow" "build/test_fast_math" \
   $(if $(THREAD_SANITIZE),"build/test_threads embedding/","$(call SKIPPED,no thread sanitizer)") \
   $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
     "$(call SKIPPED,no sanitizers)") \
@@ -128,11 +129,14 @@ SLOW_STEPS := "build/test_double --slow" "build/test_fast_math" \
 SLOW_PROGRAMS := build/fuzz build/extremes_double build/test_double build/test_fast_math $(if $(THREAD_SANITIZE),build/test_threads) \
   $(SANITIZED:%=build/test_%) $(if $(VALGRIND),build/test_valgrind)
 
-test: build/test_double build/test_float
-	@sh tests/run.sh $(FAST_STEPS)
+# Two processors: two compilers at a time unless make was told otherwise, then the header's own beside the tests.
+test: by_two build/test_double build/test_float
+	@sh tests/run.sh --beside $(call HEADER) $(FAST_STEPS)
+by_two:
+	@$(if $(findstring jobserver,$(MAKEFLAGS)),:,$(MAKE) --no-print-directory -j2 build/test_double build/test_float)
 
 check: build/test_float $(SLOW_PROGRAMS)
-	@sh tests/run.sh $(FAST_STEPS) $(SLOW_STEPS)
+	@sh tests/run.sh --beside $(call HEADER) $(FAST_STEPS) $(SLOW_STEPS)
 
 # What check does beside test (for .ci/run).
 check-only: $(SLOW_PROGRAMS)
@@ -152,7 +156,7 @@ clean:
 	rm -rf build out
 
 FORCE:
-.PHONY: all demo bench bench-full test check check-only coverage extremes portability clean FORCE
+.PHONY: all demo bench bench-full test by_two check check-only coverage extremes portability clean FORCE
 .SECONDARY:
 
 -include $(shell find build/obj -name '*.d' 2> /dev/null)

@@ -2,8 +2,10 @@
 # The header by itself: compiles in every language version, precision and linkage without a warning, links as promised,
 # exports only tlsph_ names, holds no writable data and calls nothing that prints or exits. Compilers that are missing
 # are skipped. Two compilations run at a time. Last line: N passed, N failed, N skipped.
-# Run from the repository's root; CC and CXX name the first pair of compilers.
-work=${1:-build/header}
+#   sh tests/header.sh               from the repository's root; CC names the compiler of what is linked
+#   sh tests/header.sh --optimised   only the warnings that come with optimisation: a minute of compiling
+optimised=$([ "$1" = --optimised ] && echo yes)
+work=build/header${optimised:+_optimised}
 root=$(pwd)
 rm -rf "$work"
 mkdir -p "$work" || exit 1
@@ -75,61 +77,74 @@ matrix() {
     done
 }
 
-for compiler in gcc clang; do
-    have $compiler || { skip "no $compiler"; continue; }
-    for version in c99 c11 c17; do matrix $compiler $version "$c_only" c; done
-    for build in "-O2 " "-O1 -DTLSPH_REAL_FLOAT"; do # some warnings come with optimisation only
-        ok "$compiler $build" "$compiler -std=c99 $build $c_only $common -c $work/whole.c -o $work/$compiler$(echo "$build" | tr -d ' ').o"
-    done
-done
-for compiler in g++ clang++; do
-    have $compiler || { skip "no $compiler"; continue; }
-    for version in c++11 c++20; do
-        echo 'int main(){}' > "$work/probe.cpp"
-        if $compiler -std=$version -fsyntax-only "$work/probe.cpp" 2> "$work/log"; then matrix $compiler $version "" cpp
-        else skip "$compiler without $version"; fi
-    done
-done
-
 cc=${CC:-cc}
-# for linking and nm; -fno-pic so that tables of pointers count as constant
-ok "compile double" "$cc -std=c99 -O1 -I$root -fno-pic -c $work/whole.c -o $work/double.o"
-ok "compile float" "$cc -std=c99 -O0 -I$root -DTLSPH_REAL_FLOAT -c $work/whole.c -o $work/float.o"
-
-# Two workers take every other line.
-worker() {
-    n=0
-    while IFS='|' read -r name command; do
-        n=$((n + 1))
-        [ $((n % 2)) -eq "$1" ] || continue
-        if sh -c "$command" > "$work/log$1" 2>&1; then echo "ok    $name"
-        else
-            echo "FAIL  $name: $command"
-            head -n 20 "$work/log$1"
-        fi
-    done < "$list"
+banner() {
+    ok "the banner's program runs$1" "test -s $work/banner.c && $cc -std=c99 $1 -Wall -Wextra -I$root $work/banner.c -lm -o $work/banner && $work/banner && $work/banner | grep -q 'kinetic energy'"
 }
+if [ "$optimised" ]; then
+    for compiler in gcc clang; do
+        have $compiler || { skip "no $compiler"; continue; }
+        for build in -O2 "-O1 -DTLSPH_REAL_FLOAT"; do
+            ok "$compiler $build" "$compiler -std=c99 $build $c_only $common -c $work/whole.c -o $work/$compiler$(echo "$build" | tr -d ' ').o"
+        done
+    done
+    banner " -O1"
+else
+    # The longest first. For linking and nm; -fno-pic so that tables of pointers count as constant.
+    ok "compile double" "$cc -std=c99 -O1 $c_only $common -fno-pic -c $work/whole.c -o $work/double.o"
+    ok "compile float" "$cc -std=c99 -O0 -I$root -DTLSPH_REAL_FLOAT -c $work/whole.c -o $work/float.o"
+    ok "one static unit links and runs" "$cc -std=c99 -O0 $common $work/static.c -lm -o $work/linked_static && $work/linked_static"
+    banner
+    for compiler in gcc clang; do
+        have $compiler || { skip "no $compiler"; continue; }
+        for version in c99 c11 c17; do matrix $compiler $version "$c_only" c; done
+    done
+    for compiler in g++ clang++; do
+        have $compiler || { skip "no $compiler"; continue; }
+        for version in c++11 c++20; do
+            echo 'int main(){}' > "$work/probe.cpp"
+            if $compiler -std=$version -fsyntax-only "$work/probe.cpp" 2> "$work/log"; then matrix $compiler $version "" cpp
+            else skip "$compiler without $version"; fi
+        done
+    done
+fi
+
+# Checks the line of the list whose number it is given.
+cat > "$work/one" <<'END'
+line=$(sed -n "$2p" "$1/list")
+name=${line%%|*} command=${line#*|}
+if sh -c "$command" > "$1/log$2" 2>&1; then echo "ok    $name" > "$1/out$2"
+else { echo "FAIL  $name: $command"; head -n 20 "$1/log$2"; } > "$1/out$2"; fi
+END
 phase() {
-    worker 0 > "$work/out0" & one=$!
-    worker 1 > "$work/out1" & two=$!
-    wait $one; wait $two
-    cat "$work/out0" "$work/out1" >> "$work/results"
-    cat "$work/out0" "$work/out1"
+    numbers=$(awk '{ print NR }' "$list")
+    echo "$numbers" | xargs -P 2 -n 1 sh "$work/one" "$work"
+    for number in $numbers; do cat "$work/out$number"; done > "$work/out"
+    cat "$work/out"
+    cat "$work/out" >> "$work/results"
     : > "$list"
+}
+summary() {
+    cat "$skips"
+    passed=$(grep -c '^ok ' "$work/results")
+    failed=$(grep -c '^FAIL ' "$work/results")
+    skipped=$(grep -c . "$skips")
+    echo "$passed passed, $failed failed, $skipped skipped"
+    [ "$failed" -eq 0 ]
+    exit
 }
 : > "$work/results"
 phase
+[ "$optimised" ] && summary
 
 # ---- linking: needs the objects from above ----
 
 link="$cc -std=c99 -O0 $common"
 ok "two units link and run" "$link -no-pie $work/user.c $work/second.c $work/double.o -lm -o $work/linked && $work/linked"
 ok "float units link and run" "$link -DTLSPH_REAL_FLOAT $work/user.c $work/second.c $work/float.o -lm -o $work/linked_float && $work/linked_float"
-ok "one static unit links and runs" "$link $work/static.c -lm -o $work/linked_static && $work/linked_static"
 # The linker must complain, and about the name that binds the precision.
 ok "float unit refuses a double library" "$link -DTLSPH_REAL_FLOAT -no-pie $work/user.c $work/double.o -lm -o $work/mixed 2>&1 | grep tlsph_create_float && test ! -e $work/mixed"
 ok "double unit refuses a float library" "$link $work/user.c $work/float.o -lm -o $work/mixed 2>&1 | grep 'tlsph_create\b' && test ! -e $work/mixed"
-ok "the banner's program runs" "test -s $work/banner.c && $cc -std=c99 -O1 -Wall -Wextra -I$root $work/banner.c -lm -o $work/banner && $work/banner && $work/banner | grep -q 'kinetic energy'"
 if have g++; then
     ok "C++ unit with the C library" "g++ -std=c++11 -I$root -no-pie $work/user.cpp $work/double.o -lm -o $work/linked_cpp && $work/linked_cpp"
 else skip "no g++ to link with"; fi
@@ -144,12 +159,4 @@ if have nm; then
     ok "does not print, exit or open files" "! nm -u $work/double.o | awk '{print \$NF}' | grep -vE '^(__)?v?snprintf(_chk)?\$' | grep -E 'printf|^(f?put(s|c|char)|putchar|f?write|fopen|exit|_exit|_Exit|abort|raise|__assert_fail|perror|getenv|rand|time|std(out|err))\$'"
 else skip "no nm"; fi
 phase
-
-# ---- summary ----
-
-cat "$skips"
-passed=$(grep -c '^ok ' "$work/results")
-failed=$(grep -c '^FAIL ' "$work/results")
-skipped=$(grep -c . "$skips")
-echo "$passed passed, $failed failed, $skipped skipped"
-[ "$failed" -eq 0 ]
+summary

@@ -197,6 +197,7 @@ TEST(collapse_of_the_time_step)
     victim_add(&v, TLSPH_ROLLER, 0)->normal[0] = 1;
     victim_add(&v, TLSPH_VELOCITY, 1)->value[0] = R(-0.1);
     v.conditions[1].normal[0] = 1;
+    v.desc.threads = 1; /* many steps of few particles */
     REQUIRE_OK(tlsph_create(&v.desc, &v.solver, NULL));
     const tlsph_result result = until_error(v.solver, 200000);
     CHECK(result == TLSPH_ERROR_TIME_STEP || (EPSILON > 1e-10 && result == TLSPH_ERROR_NOT_FINITE)); /* J^2 leaves floats */

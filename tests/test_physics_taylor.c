@@ -26,6 +26,7 @@ static tlsph_result bouncing_create(bouncing *bar, int n, double cfl) {
     fill.spacing = R(1.0 / n);
     scene_options_default(&options);
     options.cfl = cfl;
+    options.threads = 1; /* few particles: threads would wait for each other, here and below */
     scene_begin(&setup, &fill, &material, NULL);
     scene_add_rollers(&setup, 1);
     scene_add_rollers(&setup, 2);
@@ -78,6 +79,7 @@ static void check_bar(int fill, int wall, double radius) {
     taylor_bar_default(&p);
     p.fill = fill;
     p.wall = wall;
+    p.options.threads = 1;
     REQUIRE_OK(taylor_bar_create(&p, &bar, NULL));
     tlsph_ledger_read(bar.body.solver, &l);
     const double energy = l.total_energy, mass = 8930 * SCENE_PI / 4 * 0.0032 * 0.0032 * 0.0324;
@@ -98,7 +100,7 @@ static void check_bar(int fill, int wall, double radius) {
     taylor_bar_destroy(&bar);
 }
 TEST(taylor_bar_lattice) { check_bar(1, 0, 0.00482); }
-TEST(taylor_bar_lattice_held) { check_bar(1, 1, 0.00477); }
+TEST(slow_taylor_bar_lattice_held) { check_bar(1, 1, 0.00477); }
 TEST(slow_taylor_bar_round) { check_bar(0, 0, 0.00482); }
 
 /* To the end: the radius within what 4 spacings a radius give of table 2, and the bar flies back slowly. */
@@ -130,6 +132,7 @@ static double block_oscillation(int punch, int unknowns, double *drift) {
     perforated_block_default(&p, punch);
     p.n = 1;
     p.options.unknowns = unknowns;
+    p.options.threads = 1;
     if (!CHECK_RESULT(perforated_block_create(&p, &block, NULL), TLSPH_OK)) return 0;
     for (int k = 1; k <= 8; k++) {
         CHECK_RESULT(tlsph_advance(block.body.solver, R(p.options.end_time * k / 8)), TLSPH_OK);
@@ -156,6 +159,6 @@ TEST(pulled_block_is_smoother_with_J) {
     CHECK_BELOW(drift, 0.1);
 }
 
-SUITE(physics_taylor, ENTRY(elastic_bar_bounces), ENTRY(taylor_bar_lattice), ENTRY(taylor_bar_lattice_held),
+SUITE(physics_taylor, ENTRY(elastic_bar_bounces), ENTRY(taylor_bar_lattice), ENTRY(slow_taylor_bar_lattice_held),
       ENTRY(slow_taylor_bar_round), ENTRY(slow_taylor_bar_radius), ENTRY(punched_block_is_smoother_with_J),
       ENTRY(pulled_block_is_smoother_with_J))

@@ -369,9 +369,12 @@ static impact_outcome impact_star_state(tlsph_unknowns unknowns, tlsph_dissipati
     return worst;
 }
 
-TEST(impact_star_states_pF) { DOUBLE_ONLY(); CHECK_BELOW(impact_star_state(TLSPH_PF, TLSPH_LIMITED).overshoot, 0.05); }
+TEST(slow_impact_star_states_pF) {
+    DOUBLE_ONLY();
+    CHECK_BELOW(impact_star_state(TLSPH_PF, TLSPH_LIMITED).overshoot, 0.05);
+}
 TEST(impact_star_states_pFHJ) { DOUBLE_ONLY(); CHECK_BELOW(impact_star_state(TLSPH_PFHJ, TLSPH_LIMITED).overshoot, 0.05); }
-TEST(impact_star_states_first_order) {
+TEST(slow_impact_star_states_first_order) {
     DOUBLE_ONLY();
     CHECK_BELOW(impact_star_state(TLSPH_PF, TLSPH_FIRST_ORDER).overshoot, 0.05);
 }
@@ -386,5 +389,5 @@ SUITE(physics_waves, ENTRY(standing_wave_root_is_that_of_the_table), ENTRY(stand
       ENTRY(slow_shear_wave_second_order_all_materials), ENTRY(pulsating_rotation_formula_is_that_of_the_table),
       ENTRY(pulsating_rotation_second_order_pF_energy), ENTRY(pulsating_rotation_second_order_pF_entropy),
       ENTRY(pulsating_rotation_second_order_pFJ_energy), ENTRY(pulsating_rotation_second_order_pFHJ_energy),
-      ENTRY(pulsating_rotation_second_order_pFHJ_entropy), ENTRY(impact_star_states_pF),
-      ENTRY(impact_star_states_pFHJ), ENTRY(impact_star_states_first_order))
+      ENTRY(pulsating_rotation_second_order_pFHJ_entropy), ENTRY(slow_impact_star_states_pF),
+      ENTRY(impact_star_states_pFHJ), ENTRY(slow_impact_star_states_first_order))

@@ -532,6 +532,7 @@ static tlsph_solver *driven_block(tlsph_unknowns unknowns, tlsph_thermal thermal
     desc.particles = cloud.particles;
     desc.materials = &material;
     desc.material_count = 1;
+    desc.threads = 1;
     desc.conditions = &drive;
     desc.condition_count = 1;
     desc.unknowns = unknowns;
