@@ -92,7 +92,7 @@ bench bench-full: $(BENCH_PROGRAMS)
 	build/bench $(if $(filter bench,$@),--quick)
 	build/textbook
 	build/multirate $(if $(filter bench,$@),--quick)
-	build/scaling $(if $(filter bench,$@),--quick)
+	build/scaling $(if $(filter bench,$@),--quick,--large)
 	build/scaling_float --memory
 	sh bench/study.sh $(if $(filter bench,$@),400,5400 --full)
 

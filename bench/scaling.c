@@ -1,11 +1,14 @@
 /*
 scaling.c - memory and time by size: which arrays make up a particle, how large a body fits, what a step costs
 
-  build/scaling [--quick]           double; build/scaling_float --memory    the memory of float
+  build/scaling [--quick] [--large]   double; build/scaling_float --memory    the memory of float
 
   The arrays are those of a solver that was really created, found by their addresses in its one block: what lies between
   one array and the next is its size. cost = a + b N + c pairs is fitted to the time of a step by least squares of the
   relative misfit, over bodies of several sizes with 6, 18 and 26 neighbours.
+  --large: a body of 4 million particles beside those of 20 and 512 thousand, {p,F,H,J} and {p,F}, 6 neighbours, in smooth
+  motion: does a particle cost the same where nothing fits into a cache? Takes 5 GB, and is skipped without; Linux is asked
+  beforehand.
 */
 #define TLSPH_IMPLEMENTATION
 #define TLSPH_STATIC
@@ -251,15 +254,84 @@ static void model_time(int quick, FILE *csv) {
     ex_result("cost_largest_misfit", 100 * worst, "%");
 }
 
+/* ---- time of large bodies ---------------------------------------------------------------------------------------- */
+
+/* Bytes that a program can still have; HUGE_VAL where the system does not tell. malloc alone does not: systems lend more
+   than they have. */
+static double memory_left(void) {
+    FILE *file = fopen("/proc/meminfo", "r");
+    char line[128];
+    double kibibytes = 0, left = HUGE_VAL;
+    while (file && left == HUGE_VAL && fgets(line, sizeof line, file))
+        if (sscanf(line, "MemAvailable: %lf", &kibibytes) == 1) left = 1024 * kibibytes;
+    if (file) fclose(file);
+    return left;
+}
+
+#define BYTES_LARGE 1200.0 /* a particle takes while it is created, with its place in the cloud; less in float */
+
+/* A cube of n cells a side that swings by a thousandth of the speed of its shear waves. */
+static int create_large(sample *s, int n, tlsph_unknowns unknowns) {
+    if (BYTES_LARGE * pow(n + 1, 3) > memory_left() || make_body(&s->b, n, unknowns, TLSPH_ISOTHERMAL, 0.6)) return 1;
+    const size_t count = s->b.desc.particles.count;
+    const double speed = 1e-3 * sqrt(50050 / 2.6 / 1000), pi = 3.14159265358979324;
+    tlsph_real *v = calloc(3 * count, sizeof *v);
+    s->step = HUGE_VAL;
+    s->particles = (double)count;
+    s->solver = v ? make_solver(&s->b) : NULL;
+    for (size_t i = 0; s->solver && i < 3 * count; i++) {
+        const tlsph_real *X = s->b.cloud.particles.positions + i / 3 * 3;
+        double value = speed;
+        for (size_t k = 0; k < 3; k++) value *= k == i % 3 ? sin(pi * (double)X[k]) : cos(pi * (double)X[k]);
+        v[i] = (tlsph_real)value;
+    }
+    if (s->solver) tlsph_write(s->solver, TLSPH_FIELD_VELOCITY, v);
+    free(v);
+    return !s->solver;
+}
+
+static void destroy_large(sample *s) {
+    tlsph_destroy(s->solver);
+    tlsph_cloud_destroy(&s->b.cloud);
+}
+
+/* In turn, the least of each. */
+static void time_large(const char *name, tlsph_unknowns unknowns, FILE *csv) {
+    static const int cells[3] = { 26, 79, 159 };
+    sample s[3];
+    char key[64];
+    int count = 0;
+    memset(s, 0, sizeof s);
+    while (count < 3 && !create_large(&s[count], cells[count], unknowns)) count++;
+    if (count < 3) {
+        printf("%s: skipped, no memory for %.0f thousand particles\n", name, pow(cells[count] + 1, 3) / 1000);
+        destroy_large(&s[count]);
+    }
+    const double begin = ex_seconds();
+    for (int round = 0; count == 3 && round < 20 && (round < 3 || ex_seconds() - begin < 40); round++)
+        for (int i = 0; i < count; i++) time_sample(&s[i]);
+    for (int i = 0; count == 3 && i < count; i++) {
+        const double each = 5e8 * s[i].step / s[i].particles;
+        fprintf(csv, "%s,%.0f,%.6g\n", name, s[i].particles, each);
+        snprintf(key, sizeof key, "large_%s_%s_%.0f_thousand", name, PRECISION, s[i].particles / 1000);
+        ex_result(key, each, "ns_per_particle_and_rhs");
+    }
+    snprintf(key, sizeof key, "large_%s_%s_largest_over_smallest", name, PRECISION);
+    if (count == 3) ex_result(key, s[2].step / s[2].particles / (s[0].step / s[0].particles), "1");
+    for (int i = 0; i < count; i++) destroy_large(&s[i]);
+}
+
 int main(int argc, char **argv) {
-    int quick = 0, only_memory = 0;
+    int quick = 0, only_memory = 0, large = 0;
     const char *folder = "out/bench";
     char path[512];
     FILE *csv;
     const ex_option options[] = { { "quick", EX_FLAG, &quick, NULL, NULL, 0, 0, "up to 16 thousand particles" },
-                                  { "memory", EX_FLAG, &only_memory, NULL, NULL, 0, 0, "no times" },
+                                  { "memory", EX_FLAG, &only_memory, NULL, NULL, 0, 0, "no times but those of --large" },
+                                  { "large", EX_FLAG, &large, NULL, NULL, 0, 0,
+                                    "4 million particles beside 20 and 512 thousand, 5 GB" },
                                   { "output", EX_TEXT, &folder, NULL, NULL, 0, 0, "folder for scaling_<precision>.csv" } };
-    ex_arguments(argc, argv, "scaling", "memory and time by size", options, 3);
+    ex_arguments(argc, argv, "scaling", "memory and time by size", options, 4);
     snprintf(path, sizeof path, "%s/scaling_%s.csv", folder, PRECISION);
     if (ex_make_directory(folder) || !(csv = fopen(path, "w"))) { fprintf(stderr, "scaling: cannot write %s\n", path); return 1; }
     machine_print();
@@ -269,6 +341,12 @@ int main(int argc, char **argv) {
     list_arrays(40, TLSPH_PFHJ, TLSPH_ISOTHERMAL, "pFHJ", csv);
     list_arrays(40, TLSPH_PFHJ, TLSPH_ENERGY, "pFHJE", csv);
     if (!only_memory) model_time(quick, csv);
+    if (large) {
+        printf("\nlarge bodies, isothermal, 6 neighbours, one thread\n");
+        fprintf(csv, "unknowns,particles,ns_per_particle_and_rhs\n");
+        time_large("pFHJ", TLSPH_PFHJ, csv);
+        time_large("pF", TLSPH_PF, csv);
+    }
     fclose(csv);
     return ex_exit_code();
 }
