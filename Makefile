@@ -81,6 +81,7 @@ $(EXAMPLES): build/%: build/obj/double/examples/%.o build/obj/double/shared.a
 build/bench build/multirate build/textbook build/scaling: build/%: build/obj/double/bench/%.o \
     build/obj/double/bench/machine.o build/obj/double/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
+build/bench: build/obj/double/bench/bound.o
 build/scaling_float: build/obj/float/bench/scaling.o build/obj/float/bench/machine.o build/obj/float/shared.a
 	$(CC) $(CFLAGS) $(OPENMP) $^ -o $@ $(LDLIBS)
 build/study: build/obj/double/bench/study.o build/obj/double/bench/runs.o build/obj/double/shared.a

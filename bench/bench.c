@@ -7,7 +7,11 @@ bench.c - what a right-hand side costs, in ns per particle (a step has two of th
   timed. All cases are timed in turn, round after round, and each keeps its least time: what else runs on the machine
   comes and goes between rounds, and can only add. One thread is timed by its processor time, several by the wall clock.
   Every time stands beside the energy balance of the very steps that were timed: a fast wrong step is worth nothing.
+  Beside it, too, stands the least time that the machine allows: bytes that must move over the triad's bandwidth, or
+  flops over the peak of multiply-adds, whichever is longer (bound.c). Bodies that fit into a cache may be faster than
+  the first; aim of the large ones: 60 % of the bound.
 */
+#include "bound.h"
 #include "machine.h"
 #include "tlsph.h"
 
@@ -41,13 +45,14 @@ typedef struct {
     double count, kinetic;    /* particles; kinetic energy at the start, J */
     double creation, step;    /* least, s */
     double residual;          /* largest |energy residual| / kinetic */
+    double bytes, flops;      /* a particle and right-hand side at least; 0: unknown */
 } bench_case;
 
 typedef struct {
     int threads, case_count;
     bench_case cases[CASES_MOST];
     tlsph_cloud clouds[2];    /* 2-D, 3-D */
-    double triad;             /* GB/s */
+    double triad, peak;       /* GB/s, Gflop/s of all threads */
     ex_csv csv;
 } bench;
 
@@ -73,7 +78,9 @@ static void show_machine(bench *b) {
     b->triad = machine_triad(b->threads);
     ex_result("threads", b->threads, "");
     ex_result("triad_bandwidth", b->triad, "GB/s");
-    ex_result("double_fma_peak_one_thread", machine_fma_peak(), "Gflop/s");
+    b->peak = machine_fma_peak();
+    ex_result("double_fma_peak_one_thread", b->peak, "Gflop/s");
+    b->peak *= b->threads * (8.0 / sizeof(tlsph_real));
 }
 
 /* ---- the cases ---- */
@@ -173,6 +180,8 @@ static void create_scene(bench_case *c, const tlsph_cloud *cloud, int threads) {
     c->creation = fmin(c->creation, machine_clock(threads) - begin);
     c->count = (double)tlsph_count(c->solver);
     tlsph_size_read(c->solver, &c->size);
+    c->bytes = bound_bytes(c->solver);
+    c->flops = bound_flops(c->solver);
     if (set_motion(c, cloud, &material) != TLSPH_OK) fail(c, "could not set the motion");
     tlsph_ledger_reset(c->solver);
     tlsph_ledger_read(c->solver, &ledger);
@@ -233,22 +242,33 @@ static int run_rounds(bench *b, const bench_scale *scale) {
 
 static double ns_per_particle(const bench_case *c) { return 1e9 * c->step / STAGES / c->count; }
 static double ns_per_pair(const bench_case *c) { return 1e9 * c->step / STAGES / (double)c->size.pairs; }
+/* ns that the bytes and the flops take at least, and the share of the longer in the time. */
+static double bound_memory(const bench *b, const bench_case *c) { return c->bytes / b->triad; }
+static double bound_arithmetic(const bench *b, const bench_case *c) { return c->flops / b->peak; }
+static double bound_share(const bench *b, const bench_case *c) {
+    return fmax(bound_memory(b, c), bound_arithmetic(b, c)) / ns_per_particle(c);
+}
 static const char *label(const bench_case *c) { return c->variant[0] ? c->variant + 1 : "-"; }
 
 static void show_table(const bench *b, const bench_scale *scale, int rounds) {
-    printf("\nunknowns nb. %-15s particles ns/part. ns/pair  B/part. B/pair   GB/s creation   energy\n", "variant");
+    printf("\nunknowns nb. %-15s particles ns/part. ns/pair  B/part. B/pair creation   energy   moved flops", "variant");
+    printf("  bound share\n");
     for (int i = 0; i < b->case_count; i++) {
         const bench_case *c = b->cases + i;
         const double bytes = (double)c->size.bytes / c->count;
         if (c->failed) continue;
         printf("%-8s %3d %-15s %9.0f %8.1f %7.2f ", unknowns_name(c->unknowns), c->neighbours, label(c), c->count,
                ns_per_particle(c), ns_per_pair(c));
-        printf("%8.0f %6d %6.2f %8.1f %8.1e\n", bytes, (int)c->size.bytes_per_pair, bytes / ns_per_particle(c),
-               c->creation / c->step, c->residual);
+        printf("%8.0f %6d %8.1f %8.1e", bytes, (int)c->size.bytes_per_pair, c->creation / c->step, c->residual);
+        if (c->bytes > 0)
+            printf(" %7.0f %5.0f %5.0f %c %4.0f%%", c->bytes, c->flops, bound_share(b, c) * ns_per_particle(c),
+                   bound_memory(b, c) > bound_arithmetic(b, c) ? 'm' : 'f', 100 * bound_share(b, c));
+        puts("");
     }
     printf("ns: of one right-hand side, least of %d rounds of %d steps. B/part.: memory of the solver with pairs.\n"
-           "GB/s: if all of it moved once; the triad moves %.1f. creation: in steps. energy: residual / kinetic.\n\n",
-           rounds, scale->steps, b->triad);
+           "creation: in steps. energy: residual / kinetic. moved, flops: bytes and operations of one right-hand side at\n"
+           "least; bound: the ns of the slower at %.1f GB/s (m) or %.0f Gflop/s (f). share: bound / ns.\n\n",
+           rounds, scale->steps, b->triad, b->peak);
 }
 
 static void case_result(const bench_case *c, const char *begin, const char *suffix, const char *end, double value,
@@ -259,7 +279,7 @@ static void case_result(const bench_case *c, const char *begin, const char *suff
     ex_result(key, value, unit);
 }
 
-/* Memory and creation for the plain cases only; the table has the others, too. */
+/* Memory, creation and bounds for the plain cases only; the table has the others, too. */
 static void show_results(const bench *b, const char *suffix) {
     for (int i = 0; i < b->case_count; i++) {
         const bench_case *c = b->cases + i;
@@ -271,6 +291,7 @@ static void show_results(const bench *b, const char *suffix) {
         case_result(c, "bytes", suffix, "_per_particle", (double)c->size.bytes_per_particle, "B");
         case_result(c, "bytes", suffix, "_per_pair", (double)c->size.bytes_per_pair, "B");
         case_result(c, "creation", suffix, "_steps", c->creation / c->step, "steps");
+        case_result(c, "bound", suffix, "_reached", 100 * bound_share(b, c), "%");
     }
 }
 
@@ -292,7 +313,8 @@ static void write_rows(const bench *b) {
                 c->neighbours, c->count, label(c), b->threads);
         fprintf(b->csv.file, "%.6g,%.6g,%d,%d,", ns_per_particle(c), ns_per_pair(c), (int)c->size.bytes_per_particle,
                 (int)c->size.bytes_per_pair);
-        fprintf(b->csv.file, "%.0f,%.6g,%.6g,%.3g\n", (double)c->size.bytes, c->creation, c->step, c->residual);
+        fprintf(b->csv.file, "%.0f,%.6g,%.6g,%.3g,", (double)c->size.bytes, c->creation, c->step, c->residual);
+        fprintf(b->csv.file, "%.6g,%.6g\n", bound_memory(b, c), bound_arithmetic(b, c));
     }
 }
 
@@ -348,7 +370,8 @@ int main(int argc, char **argv) {
     ex_arguments(argc, argv, "bench", "time of a right-hand side, by unknowns and neighbours", options, 3);
     if (ex_csv_open(&b.csv, output, "bench.csv",
                     "unknowns,precision,dimension,neighbours,particles,variant,threads,ns_per_particle,ns_per_pair,"
-                    "bytes_per_particle,bytes_per_pair,bytes,creation_s,step_s,energy_residual"))
+                    "bytes_per_particle,bytes_per_pair,bytes,creation_s,step_s,energy_residual,bound_memory_ns,"
+                    "bound_arithmetic_ns"))
         fprintf(stderr, "bench: cannot write %s/bench.csv\n", output);
     if (!quick) small.seconds = 60;
     show_machine(&b);
