@@ -251,8 +251,8 @@ static double bound_share(const bench *b, const bench_case *c) {
 static const char *label(const bench_case *c) { return c->variant[0] ? c->variant + 1 : "-"; }
 
 static void show_table(const bench *b, const bench_scale *scale, int rounds) {
-    printf("\nunknowns nb. %-15s particles ns/part. ns/pair  B/part. B/pair creation   energy   moved flops", "variant");
-    printf("  bound share\n");
+    printf("\nunknowns nb. %-15s particles ns/part. ns/pair  B/part. B/pair creation   energy", "variant");
+    printf("   moved flops  bound share\n");
     for (int i = 0; i < b->case_count; i++) {
         const bench_case *c = b->cases + i;
         const double bytes = (double)c->size.bytes / c->count;
@@ -266,8 +266,8 @@ static void show_table(const bench *b, const bench_scale *scale, int rounds) {
         puts("");
     }
     printf("ns: of one right-hand side, least of %d rounds of %d steps. B/part.: memory of the solver with pairs.\n"
-           "creation: in steps. energy: residual / kinetic. moved, flops: bytes and operations of one right-hand side at\n"
-           "least; bound: the ns of the slower at %.1f GB/s (m) or %.0f Gflop/s (f). share: bound / ns.\n\n",
+           "creation: in steps. energy: residual / kinetic. moved, flops: bytes and operations of one right-hand side\n"
+           "at least; bound: the ns of the slower at %.1f GB/s (m) or %.0f Gflop/s (f). share: bound / ns.\n\n",
            rounds, scale->steps, b->triad, b->peak);
 }
 

@@ -13,7 +13,8 @@ bound.c - what a right-hand side moves and calculates at least, to judge its tim
 static double tensor(const tlsph_solver *s) { return s->dim * s->dim; }
 
 /* The stage: state, rates and v in, the new state out, and in the same pass the rows that it gives. The first stage
-   reads one state, the second two. The projection's correction of rate_p and the kinetic part of rate_E are written back. */
+   reads one state, the second two. The projection's correction of rate_p and the kinetic part of rate_E are written
+   back. */
 static double of_update(const tlsph_solver *s) {
     const double D = s->dim, DD = tensor(s), J = s->has_J, E = s->thermal != TLSPH_ISOTHERMAL;
     const double state = 2.5 * (double)s->state_reals / (double)s->n;
@@ -52,8 +53,8 @@ static double of_pair(const tlsph_solver *s, double w) {
     return slopes + D * (3 * w + 1) + damps * damping + s->conducts * (22 * all + 30);
 }
 /* Pairs have vectors along an axis, in a plane or in space as on a lattice. What a particle takes beside them is
-   counted: the scalar instructions that a body of 16^3 executes, less those of its pairs. The whole is up to a fifth below such
-   counts, as lanes without a pair calculate, too. */
+   counted: the scalar instructions that a body of 16^3 executes, less those of its pairs. The whole is up to a fifth below
+   such counts, as lanes without a pair calculate, too. */
 double bound_flops(const tlsph_solver *s) {
     const double each = (double)s->pairs / (double)s->n, D = s->dim;
     const int wide = s->size.neighbours_most > 2 * (size_t)s->dim;
