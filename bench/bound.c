@@ -53,8 +53,8 @@ static double of_pair(const tlsph_solver *s, double w) {
     return slopes + D * (3 * w + 1) + damps * damping + s->conducts * (22 * all + 30);
 }
 /* Pairs have vectors along an axis, in a plane or in space as on a lattice. What a particle takes beside them is
-   counted: the scalar instructions that a body of 16^3 executes, less those of its pairs. The whole is up to a fifth below
-   such counts, as lanes without a pair calculate, too. */
+   counted: the scalar instructions that a body of 16^3 executes, less those of its pairs. The whole is up to a fifth
+   below such counts, as lanes without a pair calculate, too. */
 double bound_flops(const tlsph_solver *s) {
     const double each = (double)s->pairs / (double)s->n, D = s->dim;
     const int wide = s->size.neighbours_most > 2 * (size_t)s->dim;

@@ -7,8 +7,8 @@ scaling.c - memory and time by size: which arrays make up a particle, how large 
   one array and the next is its size. cost = a + b N + c pairs is fitted to the time of a step by least squares of the
   relative misfit, over bodies of several sizes with 6, 18 and 26 neighbours.
   --large: a body of 4 million particles beside those of 20 and 512 thousand, {p,F,H,J} and {p,F}, 6 neighbours, in
-  smooth motion: does a particle cost the same where nothing fits into a cache? Takes 5 GB, and is skipped without; Linux
-  is asked beforehand.
+  smooth motion: does a particle cost the same where nothing fits into a cache? Takes 5 GB, and is skipped without;
+  Linux is asked beforehand.
 */
 #define TLSPH_IMPLEMENTATION
 #define TLSPH_STATIC
