@@ -3305,7 +3305,7 @@ TLSPHI_INLINE void tlsphi_respond_inline(const tlsphi_material *m, const tlsph_r
     for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
     if (m->mooney) {
         tlsph_real HxF[9];
-        tlsph_cross(H, F, HxF);
+        tlsphi_cross_inline(H, F, HxF);
         for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
     }
     const tlsph_real u = m->k / 2 * (J - 1) * (J - 1), du = m->k * (J - 1), thermal = m->beta * m->theta_R;
