@@ -4374,19 +4374,20 @@ static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin,
     for (size_t l = 0; s->beside && l < TLSPHI_LANES; l++) dt[l] *= s->beside[2 * (begin + l)];
     block->time_step = tlsphi_dmin(block->time_step, (double)s->cfl * (double)tlsphi_least_lane(dt));
 }
-/* The diffusive limit; before P and H are corrected. */
+/* The diffusive limit; before P and H are corrected. h is taken first, because with a choice of pointers gcc makes no
+   vectors. */
 TLSPHI_INLINE void tlsphi_tile_heat_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_material *m,
                                          const tlsphi_state_lanes *x, const int dim) {
     const tlsph_real *tau = s->tau + begin, *row = tlsphi_at(s, s->rows.A, begin);
-    tlsph_real dt[TLSPHI_LANES];
+    tlsph_real dt[TLSPHI_LANES], h[TLSPHI_LANES];
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) h[l] = s->beside ? s->beside[2 * (begin + l) + 1] : m->h;
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        const tlsph_real h = s->beside ? s->beside[2 * (begin + l) + 1] : m->h;
         tlsph_real in_plane[9], H[9], HtH[9];
         tlsphi_take_rows(dim * dim, row + l, in_plane);
         tlsphi_expand(dim, in_plane, dim == 3 ? 0 : in_plane[0] * in_plane[3] - in_plane[1] * in_plane[2], H);
         tlsphi_product_transposed(3, H, H, HtH); /* H H^T: its eigenvalues are those of H^T H */
         const tlsph_real bound = tlsphi_largest_bound(HtH[0] + HtH[4] + HtH[8], tlsphi_dot(9, HtH, HtH));
-        dt[l] = tau[l] * tau[l] * x->J[l] / tlsphi_max(h * bound, TLSPHI_TINY);
+        dt[l] = tau[l] * tau[l] * x->J[l] / tlsphi_max(h[l] * bound, TLSPHI_TINY);
     }
     const double per = 2 * dim, sharp = s->sharp ? TLSPHI_SHARP_STEP * TLSPHI_SHARP_STEP : 1;
     const double heat = 0.8 * (double)m->c_v * sharp * (double)tlsphi_least_lane(dt) / per;
