@@ -937,6 +937,14 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_EACH_LANE
 #endif
 
+/* Lanes on the stack begin where cache lines do: gcc sees to it wherever it makes vectors, clang only where it is asked,
+   and what lies across two lines takes longer, above all if it is loaded soon after it was stored. */
+#if defined(__clang__)
+#define TLSPHI_ALIGNED __attribute__((aligned(64)))
+#else
+#define TLSPHI_ALIGNED
+#endif
+
 #ifdef TLSPH_REAL_FLOAT
 #define tlsphi_sqrt sqrtf
 #define tlsphi_pow powf
@@ -4242,10 +4250,10 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
 /* -- the same for a tile of one material, by lanes: the built-in laws but for powers of J -- */
 
 /* A tile's state as lanes. */
-typedef struct tlsphi_state_lanes {
-    const tlsph_real *F, *H;
+typedef struct TLSPHI_ALIGNED tlsphi_state_lanes {
     tlsph_real v[3 * TLSPHI_LANES], J[TLSPHI_LANES], E[TLSPHI_LANES], c_p[TLSPHI_LANES];
     tlsph_real heat[TLSPHI_LANES], ratio[TLSPHI_LANES], good[TLSPHI_LANES];
+    const tlsph_real *F, *H;
 } tlsphi_state_lanes;
 
 static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
@@ -4845,7 +4853,7 @@ TLSPHI_INLINE void tlsphi_clear_lanes(const int rows, tlsph_real *lanes) {
         TLSPHI_UNROLL for (int i = 0; i < rows; i++) lanes[(size_t)i * TLSPHI_LANES + l] = 0;
 }
 /* Raw sums of a tile: v and w, Sigma_J, theta; by rows of lanes. */
-typedef struct tlsphi_slopes {
+typedef struct TLSPHI_ALIGNED tlsphi_slopes {
     tlsph_real v[9 * TLSPHI_LANES], w[9 * TLSPHI_LANES], S[3 * TLSPHI_LANES],
         theta[3 * TLSPHI_LANES];
 } tlsphi_slopes;
@@ -5612,7 +5620,7 @@ static void tlsphi_flux_one_by_one(const tlsph_solver *s, size_t begin, size_t e
 
 /* -- the pairs of a tile, slot by slot -- */
 
-typedef struct tlsphi_lane_sums {
+typedef struct TLSPHI_ALIGNED tlsphi_lane_sums {
     tlsph_real T[3 * TLSPHI_LANES], damped[3 * TLSPHI_LANES];
     tlsph_real J[TLSPHI_LANES], production[TLSPHI_LANES];
     tlsph_real heat[TLSPHI_LANES], source[TLSPHI_LANES], conduction[TLSPHI_LANES];
@@ -5724,7 +5732,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
                                      const int dim, const int with_J, int parts, tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
-    tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
+    TLSPHI_ALIGNED tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
     const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
     const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
     const int thin = (!damps || s->dissipation == TLSPH_LIMITED) && (!heats || (s->conduction == TLSPH_COMPACT && !s->M));
@@ -5773,7 +5781,7 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
     const tlsphi_graph *graph = &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, 0, 1, 1, 0);
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, D = (size_t)dim, dd = D * D;
-    tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES], sum[9 * TLSPHI_LANES] = {0};
+    TLSPHI_ALIGNED tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES], sum[9 * TLSPHI_LANES] = {0};
     tlsphi_take_tile(tlsphi_at(s, 0, base), r.w, r.S, a);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
@@ -6374,7 +6382,7 @@ TLSPHI_INLINE void tlsphi_vector3(const tlsph_real *v, int dim, double out[3]) {
 }
 
 /* Arms X of the particles [begin, end) of a tile, and their volumes, as lanes; 0 where the tile has no particle. */
-typedef struct tlsphi_arms {
+typedef struct TLSPHI_ALIGNED tlsphi_arms {
     double X[3][TLSPHI_LANES], V[TLSPHI_LANES], f[3][TLSPHI_LANES];
 } tlsphi_arms;
 
@@ -6457,7 +6465,7 @@ TLSPHI_INLINE void tlsphi_add_arms(const tlsphi_arms *u, const int with_inertia,
 /* Moments of v with the inertia, or of dp/dt, over a block: its lanes are added in order at the end. */
 TLSPHI_INLINE void tlsphi_block_moments(const tlsphi_projection *p, tlsphi_block *block, const int of_v) {
     const tlsph_solver *s = p->s;
-    double m[TLSPHI_MOMENTS][TLSPHI_LANES], origin[3];
+    TLSPHI_ALIGNED double m[TLSPHI_MOMENTS][TLSPHI_LANES], origin[3];
     tlsphi_arms arms;
     memset(m, 0, sizeof m);
     tlsphi_projection_origin(p, block, origin);
