@@ -60,7 +60,7 @@ build/test_$(1): $(TESTS:%.c=build/obj/$(1)/%.o) build/obj/$(1)/shared.a
 endef
 
 FLOAT := -DTLSPH_REAL_FLOAT
-ASSERT := -DCHECK_INVARIANTS
+ASSERT := -DCHECK_INVARIANTS -DTLSPHI_CACHED=0
 $(eval $(call flavour,double,$(CFLAGS) $(OPENMP),-O1))
 $(eval $(call flavour,float,$(CFLAGS) $(OPENMP) $(FLOAT),-O1 $(FLOAT)))
 $(eval $(call flavour,sanitized,-O1 -g $(SANITIZE) $(ASSERT),-O1 -g $(SANITIZE)))
@@ -69,7 +69,7 @@ $(eval $(call flavour,valgrind,-O1 -g,-O1 -g))
 # The header promises to find values that are not finite even so.
 $(eval $(call flavour,fast_math,-Ofast $(OPENMP),-O1))
 # Threads of the host only: the sanitizer does not know those of OpenMP's library.
-$(eval $(call flavour,threads,-O1 -g $(THREAD_SANITIZE),-O1 -g $(THREAD_SANITIZE)))
+$(eval $(call flavour,threads,-O1 -g $(THREAD_SANITIZE) -DTLSPHI_CACHED=0,-O1 -g $(THREAD_SANITIZE)))
 # A function that is inlined everywhere counts once, as it stands in the source.
 $(eval $(call flavour,coverage,-O0 -g --coverage -Dalways_inline=unused,-O0))
 
