@@ -976,8 +976,23 @@ typedef uint64_t tlsphi_bits;
 
 #define TLSPHI_R(x) ((tlsph_real)(x)) /* a constant in the precision of the build */
 
-TLSPHI_INLINE tlsph_real tlsphi_max(tlsph_real a, tlsph_real b) { return a > b ? a : b; }
-TLSPHI_INLINE tlsph_real tlsphi_min(tlsph_real a, tlsph_real b) { return a < b ? a : b; }
+/* yes ? a : b in loops over lanes. gcc moves what only one of the two needs behind the choice, and without the masks of
+   AVX-512 makes no vectors of such a loop: with AVX2 both are worked out and their bits joined, which halves a step's time. */
+#if defined(__GNUC__) && !defined(__clang__) && defined(__AVX2__) && !defined(__AVX512F__)
+TLSPHI_INLINE tlsph_real tlsphi_choose(int yes, tlsph_real a, tlsph_real b) {
+    const tlsphi_bits mask = (tlsphi_bits)0 - (tlsphi_bits)(yes != 0);
+    tlsphi_bits of_a, of_b;
+    memcpy(&of_a, &a, sizeof a);
+    memcpy(&of_b, &b, sizeof b);
+    of_a = (of_a & mask) | (of_b & ~mask);
+    memcpy(&a, &of_a, sizeof a);
+    return a;
+}
+#else
+TLSPHI_INLINE tlsph_real tlsphi_choose(int yes, tlsph_real a, tlsph_real b) { return yes ? a : b; }
+#endif
+TLSPHI_INLINE tlsph_real tlsphi_max(tlsph_real a, tlsph_real b) { return tlsphi_choose(a > b, a, b); }
+TLSPHI_INLINE tlsph_real tlsphi_min(tlsph_real a, tlsph_real b) { return tlsphi_choose(a < b, a, b); }
 static double tlsphi_dmax(double a, double b) { return a > b ? a : b; }
 static double tlsphi_dmin(double a, double b) { return a < b ? a : b; }
 
@@ -1011,7 +1026,7 @@ TLSPHI_INLINE tlsph_real tlsphi_inverse_cube_root(tlsph_real x) {
 /* x^(-1/2) and x^(1/2) in the same manner, for loops over lanes: sqrt must set errno, which no compiler can do for eight
    numbers at once. A huge number for x = 0, but one whose square is finite. */
 TLSPHI_INLINE tlsph_real tlsphi_inverse_root(tlsph_real given) {
-    const tlsph_real least = 64 * TLSPHI_TINY, x = given > least ? given : least; /* half of it must not be flushed to 0 */
+    const tlsph_real least = 64 * TLSPHI_TINY, x = tlsphi_max(given, least); /* half of it must not be flushed to 0 */
     tlsph_real y;
     tlsphi_bits bits;
     memcpy(&bits, &x, sizeof bits);
@@ -1056,8 +1071,7 @@ TLSPHI_INLINE tlsph_real tlsphi_exp(tlsph_real given) {
 }
 /* 1/x, or 0 for x = 0: lanes without a pair have nothing else than zeros, in whatever order a compiler multiplies them. */
 TLSPHI_INLINE tlsph_real tlsphi_inverse_or_0(tlsph_real x) {
-    const tlsph_real inverse = 1 / (x > TLSPHI_TINY ? x : TLSPHI_TINY);
-    return x > TLSPHI_TINY ? inverse : 0;
+    return tlsphi_choose(x > TLSPHI_TINY, 1 / tlsphi_max(x, TLSPHI_TINY), 0);
 }
 TLSPHI_INLINE int tlsphi_nan(tlsph_real x) { /* not finite, and not equal to infinity's bits */
     const tlsph_real infinity = (tlsph_real)HUGE_VAL, minus = -infinity;
@@ -3261,17 +3275,18 @@ TLSPHI_INLINE void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator
                           tlsph_response *out) {
     const tlsph_real elastic = tlsphi_acoustic_bound(m, dev, s);
     const tlsph_real shear = dev->a + dev->b * s->I1 * TLSPHI_R(1.0 / 3.0);
-    const tlsph_real per_theta = 1 / m->theta_R, per_c_v = 1 / m->c_v;
+    /* isothermal scenes may have no c_v */
+    const tlsph_real per_theta = 1 / m->theta_R, per_c_v = tlsphi_choose(coupled, tlsphi_inverse_or_0(m->c_v), 0);
     if (m->entropic) {
         out->p_modulus[0] = out->s_modulus[0] = 0;
         out->p_modulus[1] = elastic * per_theta;
-        if (coupled) out->p_modulus[1] += tlsphi_entropic_coupling(m, dev, s) * per_c_v;
+        out->p_modulus[1] += tlsphi_choose(coupled, tlsphi_entropic_coupling(m, dev, s) * per_c_v, 0);
         out->s_modulus[1] = shear * per_theta;
         return;
     }
     const tlsph_real power = m->q == 1 ? 1 : tlsphi_pow(s->J, m->q - 1), gruneisen = m->beta * power; /* d eta_R/dJ */
     tlsph_real thermal = m->beta * (1 - m->q) * power * dev->per_J;
-    if (coupled && m->beta != 0) thermal += gruneisen * gruneisen * per_c_v;
+    thermal += gruneisen * gruneisen * per_c_v;
     out->p_modulus[0] = elastic;
     out->p_modulus[1] = thermal * s->LH;
     out->s_modulus[0] = shear;
@@ -4569,8 +4584,8 @@ TLSPHI_INLINE void tlsphi_damp_velocity(const int dim, const int kind, const tls
         const tlsph_real raw = tlsphi_dot(dim, n, Dv);
         /* tangent is perpendicular to n, so its product with Dv is that with the tangential part of Dv */
         const tlsph_real least = TLSPHI_LIMITER_FLOOR * tlsphi_dot(dim, tangent, tangent);
-        keep = tlsphi_dot(dim, tangent, Dv) > least ? TLSPHI_R(1) : TLSPHI_R(0);
-        normal = normal * raw > TLSPHI_LIMITER_FLOOR * normal * normal ? normal : 0;
+        keep = tlsphi_choose(tlsphi_dot(dim, tangent, Dv) > least, 1, 0);
+        normal = tlsphi_choose(normal * raw > TLSPHI_LIMITER_FLOOR * normal * normal, normal, 0);
         normal += front * (raw - normal);
     }
     const tlsph_real across = keep * half_impedance * c_s, along = half_impedance * c_p * normal * inverse;
@@ -4579,7 +4594,7 @@ TLSPHI_INLINE void tlsphi_damp_velocity(const int dim, const int kind, const tls
 /* The jump of a scalar that is damped; Dr: with its linear part taken away. */
 TLSPHI_INLINE tlsph_real tlsphi_damped_jump(int kind, tlsph_real D, tlsph_real Dr, tlsph_real front) {
     if (kind == TLSPH_LIMITED || kind == TLSPH_SELF_ADJOINT) {
-        const tlsph_real limited = D * Dr > TLSPHI_LIMITER_FLOOR * Dr * Dr ? Dr : 0;
+        const tlsph_real limited = tlsphi_choose(D * Dr > TLSPHI_LIMITER_FLOOR * Dr * Dr, Dr, 0);
         return limited + front * (D - limited);
     }
     return kind == TLSPH_RECONSTRUCTED ? Dr : D;
@@ -4598,7 +4613,7 @@ TLSPHI_INLINE tlsph_real tlsphi_front(tlsph_real raw, tlsph_real slope_a, tlsph_
     const tlsph_real rough = 1 - tlsphi_min(tlsphi_smoothness(raw, slope_a), tlsphi_smoothness(raw, slope_b));
     const tlsph_real strength = (-raw / c_p - TLSPHI_R(TLSPHI_FRONT_LOW)) / TLSPHI_R(TLSPHI_FRONT_LOW);
     const tlsph_real front = tlsphi_min(1, strength) * tlsphi_min(1, TLSPHI_R(TLSPHI_FRONT_GAIN) * rough * rough);
-    return strength > 0 ? front : 0; /* otherwise `rough` may be 0/0 */
+    return tlsphi_choose(strength > 0, front, 0); /* otherwise `rough` may be 0/0 */
 }
 /* S_J (000-73) times the share a_J, weakened where the drift potential is stiff; cc = |c|^2, CC = |C|. */
 TLSPHI_INLINE tlsph_real tlsphi_jacobian_factor(tlsph_real a_J, tlsph_real cc, tlsph_real CC, tlsph_real rho,
@@ -5462,7 +5477,7 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsphi_damp_side *a, const tlsphi
     const tlsph_real rho = (a->rho + b->rho) / 2, share = metal ? tlsphi_square_root(cc) / (2 * CC) : TLSPHI_R(0.5);
     const tlsph_real c_p = (a->c_p + b->c_p) * share, c_s = (a->c_s + b->c_s) * share;
     const tlsph_real raw = tlsphi_dot(dim, c, Dv), low = TLSPHI_R(TLSPHI_FRONT_LOW) * c_p;
-    out->approaches = raw < 0 && raw * raw > low * low * cc && !metal ? TLSPHI_R(1) : TLSPHI_R(0);
+    out->approaches = metal ? 0 : tlsphi_choose((raw < 0) & (raw * raw > low * low * cc), 1, 0);
     if (kind == TLSPH_LIMITED && with_front && !metal) {
         const tlsph_real per = tlsphi_inverse_root(cc);
         front = tlsphi_front(raw * per, tlsphi_dot(dim, c, Gd_a) * per, tlsphi_dot(dim, c, Gd_b) * per, c_p);
@@ -5550,19 +5565,20 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat
         q_b -= tlsphi_dot(dim, b->heat, rest);
     }
     const tlsph_real D_theta = b->theta - a->theta, one = 1;
-    const int front = compact && (D_theta > a->theta || -D_theta > b->theta);
-    q_a = front ? 0 : q_a;
-    q_b = front ? 0 : q_b;
+    const int front = compact && ((D_theta > a->theta) | (-D_theta > b->theta));
+    q_a = tlsphi_choose(front, 0, q_a);
+    q_b = tlsphi_choose(front, 0, q_b);
     out->source = -q_a * D_theta;
-    out->heat = -(q_a * (thermal == TLSPH_ENERGY ? b->theta : one) + q_b * (thermal == TLSPH_ENERGY ? a->theta : one)) / 2;
+    const int energy = thermal == TLSPH_ENERGY;
+    out->heat = -(q_a * tlsphi_choose(energy, b->theta, one) + q_b * tlsphi_choose(energy, a->theta, one)) / 2;
     out->conduction = 0;
     if (!compact) return;
     tlsph_real d[3] = {0};
     TLSPHI_UNROLL for (int i = 0; i < width; i++) d[i] = b->X[i] - a->X[i];
     const tlsph_real slope = (tlsphi_dot(width, a->slope, d) + tlsphi_dot(width, b->slope, d)) / 2;
-    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = front ? D_theta : limited;
+    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = tlsphi_choose(front, D_theta, limited);
     const tlsph_real into = k * jump;
-    out->heat += into / (thermal == TLSPH_ENERGY ? one : a->theta);
+    out->heat += into / tlsphi_choose(energy, one, a->theta);
     out->conduction = into * D_theta * tlsphi_inverse_or_0(2 * a->theta * b->theta);
 }
 
