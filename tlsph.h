@@ -937,8 +937,8 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_EACH_LANE
 #endif
 
-/* Lanes on the stack begin where cache lines do: gcc sees to it wherever it makes vectors, clang only where it is asked,
-   and what lies across two lines takes longer, above all if it is loaded soon after it was stored. */
+/* Lanes on the stack begin where cache lines do: gcc sees to it wherever it makes vectors, clang only where it is
+   asked, and what lies across two lines takes longer, above all if it is loaded soon after it was stored. */
 #if defined(__clang__)
 #define TLSPHI_ALIGNED __attribute__((aligned(64)))
 #else
@@ -976,8 +976,9 @@ typedef uint64_t tlsphi_bits;
 
 #define TLSPHI_R(x) ((tlsph_real)(x)) /* a constant in the precision of the build */
 
-/* yes ? a : b in loops over lanes. gcc moves what only one of the two needs behind the choice, and without the masks of
-   AVX-512 makes no vectors of such a loop: with AVX2 both are worked out and their bits joined, which halves a step's time. */
+/* yes ? a : b in loops over lanes. gcc moves what only one of the two needs behind the choice, and without the masks
+   of AVX-512 makes no vectors of such a loop: with AVX2 both are worked out and their bits joined, which halves the
+   time of a step. */
 #if defined(__GNUC__) && !defined(__clang__) && defined(__AVX2__) && !defined(__AVX512F__)
 TLSPHI_INLINE tlsph_real tlsphi_choose(int yes, tlsph_real a, tlsph_real b) {
     const tlsphi_bits mask = (tlsphi_bits)0 - (tlsphi_bits)(yes != 0);
@@ -3275,8 +3276,7 @@ TLSPHI_INLINE void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator
                           tlsph_response *out) {
     const tlsph_real elastic = tlsphi_acoustic_bound(m, dev, s);
     const tlsph_real shear = dev->a + dev->b * s->I1 * TLSPHI_R(1.0 / 3.0);
-    /* isothermal scenes may have no c_v */
-    const tlsph_real per_theta = 1 / m->theta_R, per_c_v = tlsphi_choose(coupled, tlsphi_inverse_or_0(m->c_v), 0);
+    const tlsph_real per_theta = 1 / m->theta_R, per_c_v = 1 / m->c_v; /* isothermal scenes may have no c_v */
     if (m->entropic) {
         out->p_modulus[0] = out->s_modulus[0] = 0;
         out->p_modulus[1] = elastic * per_theta;
@@ -3286,7 +3286,7 @@ TLSPHI_INLINE void tlsphi_moduli(const tlsphi_material *m, const tlsphi_deviator
     }
     const tlsph_real power = m->q == 1 ? 1 : tlsphi_pow(s->J, m->q - 1), gruneisen = m->beta * power; /* d eta_R/dJ */
     tlsph_real thermal = m->beta * (1 - m->q) * power * dev->per_J;
-    thermal += gruneisen * gruneisen * per_c_v;
+    thermal += tlsphi_choose(coupled, gruneisen * gruneisen * per_c_v, 0);
     out->p_modulus[0] = elastic;
     out->p_modulus[1] = thermal * s->LH;
     out->s_modulus[0] = shear;
@@ -3856,10 +3856,10 @@ TLSPHI_INLINE tlsph_real *tlsphi_at(const tlsph_solver *s, int row, size_t a) {
     return s->row + (a / TLSPHI_BLOCK * (size_t)s->rows.count + (size_t)row) * TLSPHI_ROW + a % TLSPHI_BLOCK;
 }
 /* -- bodies larger than the cache --
-   To the processor the rows of a tile are some forty streams, more than it follows by itself, and the tile waits for each.
-   So a pass first reads what its next block will need once through, a cache line after the other, at more than twice the
-   speed: that saves a fifth of a step. Prefetches in place of the reads are dropped when there are that many; the few of
-   tlsphi_prefetch_rows are for rows that are only written. Smaller bodies would lose up to 3 %. */
+   To the processor the rows of a tile are some forty streams, more than it follows by itself, and the tile waits for
+   each. So a pass first reads what its next block will need once through, a cache line after the other, at more than
+   twice the speed: that saves a fifth of a step. Prefetches in place of the reads are dropped when there are that many;
+   the few of tlsphi_prefetch_rows are for rows that are only written. Smaller bodies would lose up to 3 %. */
 #ifndef TLSPHI_CACHED /* tests set 0 */
 #define TLSPHI_CACHED ((size_t)8 << 20) /* bytes */
 #endif
@@ -3874,8 +3874,8 @@ static void tlsphi_warm(const tlsph_real *from, size_t count) {
 static void tlsphi_warm_rows(const tlsph_solver *s, size_t a, int first, int end) {
     for (int r = first; r < end; r++) tlsphi_warm(tlsphi_at(s, r, a - a % TLSPHI_BLOCK), TLSPHI_BLOCK);
 }
-/* A particle of the block that the next block will be the first to reach: the last neighbour of its first tile within some
-   layers of a strip (see TLSPHI_STRIP); one in another strip concerns few of its tiles. */
+/* A particle of the block that the next block will be the first to reach: the last neighbour of its first tile within
+   some layers of a strip (see TLSPHI_STRIP); one in another strip concerns few of its tiles. */
 static size_t tlsphi_reach_ahead(const tlsph_solver *s, const tlsphi_block *block) {
     const tlsphi_graph *graph = &s->graph;
     const tlsphi_block *next = block + (block + 1 < s->block + s->blocks);
@@ -3888,8 +3888,8 @@ static size_t tlsphi_reach_ahead(const tlsph_solver *s, const tlsphi_block *bloc
     }
     return last;
 }
-/* Asks for the rows [first, end) of the tile behind the one whose row 0 is at `at`. At the end of a block this asks for its
-   spare columns, in vain but in bounds. */
+/* Asks for the rows [first, end) of the tile behind the one whose row 0 is at `at`. At the end of a block this asks for
+   its spare columns, in vain but in bounds. */
 TLSPHI_INLINE void tlsphi_prefetch_rows(const tlsph_real *at, int first, int end) {
     for (int r = first; r < end; r++) TLSPHI_PREFETCH(at + (size_t)r * TLSPHI_ROW + TLSPHI_LANES);
 }
@@ -4317,8 +4317,8 @@ TLSPHI_INLINE void tlsphi_transpose(const tlsph_real *from, const size_t n, tlsp
     for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
 }
-/* Takes F and H from the lanes, completed in plane strain; H = cof F where it is not evolved. d is a
-   number of its own: clang turns a choice between two members into one of addresses, and then makes no vectors. */
+/* Takes F and H from the lanes, completed in plane strain; H = cof F where it is not evolved. d is a number of
+   its own: clang turns a choice between two members into one of addresses, and then makes no vectors. */
 TLSPHI_INLINE void tlsphi_take_measures(const tlsphi_state_lanes *x, size_t l, const int dim, const int has_H, int has_J,
                                         tlsphi_point *pt) {
     tlsph_real F[9], H[9];
@@ -5576,8 +5576,8 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat
     tlsph_real d[3] = {0};
     TLSPHI_UNROLL for (int i = 0; i < width; i++) d[i] = b->X[i] - a->X[i];
     const tlsph_real slope = (tlsphi_dot(width, a->slope, d) + tlsphi_dot(width, b->slope, d)) / 2;
-    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0), jump = tlsphi_choose(front, D_theta, limited);
-    const tlsph_real into = k * jump;
+    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0);
+    const tlsph_real into = k * tlsphi_choose(front, D_theta, limited);
     out->heat += into / tlsphi_choose(energy, one, a->theta);
     out->conduction = into * D_theta * tlsphi_inverse_or_0(2 * a->theta * b->theta);
 }
