@@ -3858,8 +3858,8 @@ TLSPHI_INLINE tlsph_real *tlsphi_at(const tlsph_solver *s, int row, size_t a) {
 /* -- bodies larger than the cache --
    To the processor the rows of a tile are some forty streams, more than it follows by itself, and the tile waits for
    each. So a pass first reads what its next block will need once through, a cache line after the other, at more than
-   twice the speed: that saves a fifth of a step. Prefetches in place of the reads are dropped when there are that many;
-   the few of tlsphi_prefetch_rows are for rows that are only written. Smaller bodies would lose up to 3 %. */
+   twice the speed: that saves a fifth of a step. So many prefetches in place of the reads gained nothing; the few of
+   tlsphi_prefetch_rows are for rows that are only written. Smaller bodies would lose up to 3 %. */
 #ifndef TLSPHI_CACHED /* tests set 0 */
 #define TLSPHI_CACHED ((size_t)8 << 20) /* bytes */
 #endif
