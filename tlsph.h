@@ -1210,9 +1210,8 @@ TLSPHI_INLINE void tlsphi_multiply_transposed(int n, const tlsph_real *A, const 
 TLSPHI_INLINE void tlsphi_multiply_mean(int n, int width, const tlsph_real *A, const tlsph_real *B, const tlsph_real *x,
                                         tlsph_real *y) {
     TLSPHI_UNROLL for (int i = 0; i < n; i++) {
-        y[i] = (A[i * width] + B[i * width]) * x[0];
-        TLSPHI_UNROLL for (int j = 1; j < width; j++) y[i] += (A[i * width + j] + B[i * width + j]) * x[j];
-        y[i] *= TLSPHI_R(0.5);
+        y[i] = (A[i * width] + B[i * width]) * (x[0] / 2);
+        TLSPHI_UNROLL for (int j = 1; j < width; j++) y[i] += (A[i * width + j] + B[i * width + j]) * (x[j] / 2);
     }
 }
 /* A += a (x) b */
@@ -3659,6 +3658,7 @@ enum { TLSPHI_MOMENTS = 16 }; /* sums of the projection, see [PROJECTION] */
 typedef struct tlsphi_block {
     uint32_t begin, end, body;
     uint32_t tile; /* its first, in a graph */
+    uint32_t fronts; /* bit i: tile i had one last time, see tlsphi_flux_tile */
     int level, seen; /* [MULTI-RATE]; bit l: some neighbours have another level l */
     double reached;  /* the time of its x there */
     uint32_t failed; /* first bad particle of the block, or TLSPHI_NONE */
@@ -4573,45 +4573,46 @@ TLSPHI_INLINE tlsph_real tlsphi_pair_density(tlsph_real a, tlsph_real b) {
 }
 
 /* S_p (jump): half_impedance = rho |C| / 2; Dr: the jump without its linear part; n: any vector along the normal, inverse
-   1/(n.n); front in [0, 1] gives the normal part of the raw jump back. */
-TLSPHI_INLINE void tlsphi_damp_velocity(const int dim, const int kind, const tlsph_real *Dv, const tlsph_real *Dr,
-                                        const tlsph_real *n, tlsph_real inverse, tlsph_real front,
+   1/(n.n); front in [0, 1] gives the normal part of the raw jump back, where with_front is not 0. */
+TLSPHI_INLINE void tlsphi_damp_velocity(const int dim, const int kind, const int with_front, const tlsph_real *Dv,
+                                        const tlsph_real *Dr, const tlsph_real *n, tlsph_real inverse, tlsph_real front,
                                         tlsph_real half_impedance, tlsph_real c_p, tlsph_real c_s, tlsph_real *D_p) {
     const tlsph_real *jump = kind == TLSPH_FIRST_ORDER || kind == TLSPH_AS_PRINTED ? Dv : Dr;
-    tlsph_real normal = tlsphi_dot(dim, n, jump), tangent[3], keep = 1;
+    tlsph_real normal = tlsphi_dot(dim, n, jump), across = half_impedance * c_s, tangent[3];
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) tangent[i] = jump[i] - normal * inverse * n[i];
     if (kind == TLSPH_LIMITED) {
         const tlsph_real raw = tlsphi_dot(dim, n, Dv);
         /* tangent is perpendicular to n, so its product with Dv is that with the tangential part of Dv */
         const tlsph_real least = TLSPHI_LIMITER_FLOOR * tlsphi_dot(dim, tangent, tangent);
-        keep = tlsphi_choose(tlsphi_dot(dim, tangent, Dv) > least, 1, 0);
+        across = tlsphi_choose(tlsphi_dot(dim, tangent, Dv) > least, across, 0);
         normal = tlsphi_choose(normal * raw > TLSPHI_LIMITER_FLOOR * normal * normal, normal, 0);
-        normal += front * (raw - normal);
+        if (with_front) normal += front * (raw - normal);
     }
-    const tlsph_real across = keep * half_impedance * c_s, along = half_impedance * c_p * normal * inverse;
+    const tlsph_real along = half_impedance * c_p * normal * inverse;
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) D_p[i] = across * tangent[i] + along * n[i];
 }
 /* The jump of a scalar that is damped; Dr: with its linear part taken away. */
-TLSPHI_INLINE tlsph_real tlsphi_damped_jump(int kind, tlsph_real D, tlsph_real Dr, tlsph_real front) {
+TLSPHI_INLINE tlsph_real tlsphi_damped_jump(int kind, const int with_front, tlsph_real D, tlsph_real Dr,
+                                            tlsph_real front) {
     if (kind == TLSPH_LIMITED || kind == TLSPH_SELF_ADJOINT) {
         const tlsph_real limited = tlsphi_choose(D * Dr > TLSPHI_LIMITER_FLOOR * Dr * Dr, Dr, 0);
-        return limited + front * (D - limited);
+        return with_front ? limited + front * (D - limited) : limited;
     }
     return kind == TLSPH_RECONSTRUCTED ? Dr : D;
 }
 
 /* Fronts. Behind a shock Dr is small although one of the two gradients belongs to the other side: reconstruction alone
    overshoots. `front` in [0, 1] tells how much of the raw jump is put back. It needs two things: the particles approach
-   each other by more than TLSPHI_FRONT_LOW of the p speed (raw < 0), and the jumps of the far sides, 2 slope - raw, are
-   unlike raw. For rho = far/raw the van Albada function phi = rho (rho + 1)/(rho^2 + 1) is 1 +- O(h) in smooth flow and
+   each other by more than TLSPHI_FRONT_LOW of the p speed (raw < 0), and the jumps beyond them, 2 slope - raw, are unlike
+   raw. For rho = beyond/raw the van Albada function phi = rho (rho + 1)/(rho^2 + 1) is 1 +- O(h) in smooth flow and
    0 at the foot of a front, so front is O(h^2) where there is none, and exactly 0 in gentle flow. */
 TLSPHI_INLINE tlsph_real tlsphi_smoothness(tlsph_real raw, tlsph_real slope) {
-    const tlsph_real rho = 2 * slope / raw - 1;
-    return tlsphi_max(0, tlsphi_min(1, rho * (rho + 1) / (rho * rho + 1)));
+    const tlsph_real beyond = 2 * slope - raw;
+    return tlsphi_max(0, tlsphi_min(1, beyond * (beyond + raw) / (beyond * beyond + raw * raw)));
 }
 TLSPHI_INLINE tlsph_real tlsphi_front(tlsph_real raw, tlsph_real slope_a, tlsph_real slope_b, tlsph_real c_p) {
     const tlsph_real rough = 1 - tlsphi_min(tlsphi_smoothness(raw, slope_a), tlsphi_smoothness(raw, slope_b));
-    const tlsph_real strength = (-raw / c_p - TLSPHI_R(TLSPHI_FRONT_LOW)) / TLSPHI_R(TLSPHI_FRONT_LOW);
+    const tlsph_real strength = -raw / (TLSPHI_R(TLSPHI_FRONT_LOW) * c_p) - 1;
     const tlsph_real front = tlsphi_min(1, strength) * tlsphi_min(1, TLSPHI_R(TLSPHI_FRONT_GAIN) * rough * rough);
     return tlsphi_choose(strength > 0, front, 0); /* otherwise `rough` may be 0/0 */
 }
@@ -4632,8 +4633,8 @@ static void tlsphi_dissipation_as_printed(const tlsph_pair_side *a, const tlsph_
         jump[i] = b->velocity[i] / Xb - a->velocity[i] / Xa;
     }
     const tlsph_real DS = b->Sigma_J - a->Sigma_J, jump_S = b->Sigma_J / Xb - a->Sigma_J / Xa;
-    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, jump, jump, n, 1, 0, half_impedance, c_p, c_s, out->D_p);
-    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, Dv, Dv, n, 1, 0, half_impedance, c_p, c_s, D_v);
+    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, 0, jump, jump, n, 1, 0, half_impedance, c_p, c_s, out->D_p);
+    tlsphi_damp_velocity(3, TLSPH_AS_PRINTED, 0, Dv, Dv, n, 1, 0, half_impedance, c_p, c_s, D_v);
     out->D_J = S_J * jump_S;
     const tlsph_real wanted = tlsphi_dot(3, Dv, D_v) + S_J * DS * DS;
     const tlsph_real bracket = wanted - tlsphi_dot(3, jump, out->D_p) - S_J * jump_S * jump_S;
@@ -4670,9 +4671,9 @@ TLSPHI_DEF void tlsph_pair_dissipation(tlsph_dissipation kind, const tlsph_pair_
     }
     const tlsph_real DS = b->Sigma_J - a->Sigma_J;
     const tlsph_real DSr = DS - (tlsphi_dot(3, a->Sigma_J_gradient, d) + tlsphi_dot(3, b->Sigma_J_gradient, d)) / 2;
-    tlsphi_damp_velocity(3, (int)kind, Dv, Dr, n, 1, front, tlsphi_pair_density(a->density, b->density) * CC / 2, c_p,
-                         c_s, out->D_p);
-    out->D_J = S_J * tlsphi_damped_jump((int)kind, DS, DSr, front);
+    tlsphi_damp_velocity(3, (int)kind, 1, Dv, Dr, n, 1, front, tlsphi_pair_density(a->density, b->density) * CC / 2,
+                         c_p, c_s, out->D_p);
+    out->D_J = S_J * tlsphi_damped_jump((int)kind, 1, DS, DSr, front);
     for (int i = 0; i < 3; i++) out->D_E += (a->velocity[i] + b->velocity[i]) / 2 * out->D_p[i];
     out->D_E += (a->Sigma_J + b->Sigma_J) / 2 * out->D_J;
     out->production = tlsphi_dot(3, Dv, out->D_p) + DS * out->D_J;
@@ -5441,9 +5442,9 @@ TLSPHI_INLINE void tlsphi_load_heat(const tlsphi_rows *r, const tlsph_real *at, 
     out->h_J = at[(size_t)r->h_J * apart];
 }
 
-/* What a pair dissipates: the fluxes, their production, and whether it might be a front. */
+/* What a pair dissipates: the fluxes, their production, and whether it might be a front: if `approach` < 0. */
 typedef struct tlsphi_damping {
-    tlsph_real D_p[3], D_J, production, approaches;
+    tlsph_real D_p[3], D_J, production, approach;
 } tlsphi_damping;
 /* (002-28) for one pair. */
 TLSPHI_INLINE void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, int dim, tlsphi_damping *out) {
@@ -5458,38 +5459,42 @@ TLSPHI_INLINE void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, si
         out->production += (w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW]) * out->D_p[i];
     }
 }
-/* Default forms for one pair: g and |C| of the pair. dim, with_J, with_front, kind are constants after inlining. Without
-   with_front the fluxes are those away from fronts, and `approaches` tells whether that must be looked at again. */
+/* Default forms for one pair: g and |C| of the pair. dim, width, with_J, with_front, kind are constants after inlining.
+   Without with_front the fluxes are those away from fronts; `approach` tells whether that must be looked at again. */
 TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsphi_damp_side *a, const tlsphi_damp_side *b, const tlsph_real *g,
                                          tlsph_real CC, const int dim, const int width, const int with_J,
                                          const int with_front, const int kind, const int metal, tlsph_real jump_share,
                                          tlsphi_damping *out) {
-    tlsph_real c[3] = {0}, d[3] = {0}, Dv[3], Dr[3], Gd_a[3], Gd_b[3], front = 0;
+    tlsph_real c[3] = {0}, d[3] = {0}, Dv[3], Dr[3], front = 0;
     tlsphi_multiply_mean(dim, width, a->A, b->A, g, c);
     TLSPHI_UNROLL for (int i = 0; i < width; i++) d[i] = b->X[i] - a->X[i];
-    tlsphi_multiply_thin(dim, width, a->slope_w, d, Gd_a);
-    tlsphi_multiply_thin(dim, width, b->slope_w, d, Gd_b);
+    tlsphi_multiply_mean(dim, width, a->slope_w, b->slope_w, d, Dr);
     TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
         Dv[i] = b->w[i] - a->w[i];
-        Dr[i] = Dv[i] - (Gd_a[i] + Gd_b[i]) / 2;
+        Dr[i] = Dv[i] - Dr[i];
     }
     const tlsph_real cc = tlsphi_dot(dim, c, c), inverse = tlsphi_inverse_or_0(cc);
     const tlsph_real rho = (a->rho + b->rho) / 2, share = metal ? tlsphi_square_root(cc) / (2 * CC) : TLSPHI_R(0.5);
     const tlsph_real c_p = (a->c_p + b->c_p) * share, c_s = (a->c_s + b->c_s) * share;
     const tlsph_real raw = tlsphi_dot(dim, c, Dv), low = TLSPHI_R(TLSPHI_FRONT_LOW) * c_p;
-    out->approaches = metal ? 0 : tlsphi_choose((raw < 0) & (raw * raw > low * low * cc), 1, 0);
+    out->approach = raw * tlsphi_abs(raw) + low * low * cc;
     if (kind == TLSPH_LIMITED && with_front && !metal) {
         const tlsph_real per = tlsphi_inverse_root(cc);
+        tlsph_real Gd_a[3], Gd_b[3];
+        tlsphi_multiply_thin(dim, width, a->slope_w, d, Gd_a);
+        tlsphi_multiply_thin(dim, width, b->slope_w, d, Gd_b);
         front = tlsphi_front(raw * per, tlsphi_dot(dim, c, Gd_a) * per, tlsphi_dot(dim, c, Gd_b) * per, c_p);
     }
-    tlsphi_damp_velocity(dim, kind, Dv, Dr, c, inverse, front, tlsphi_pair_density(a->rho, b->rho) * CC / 2, c_p, c_s,
-                         out->D_p);
+    tlsphi_damp_velocity(dim, kind, with_front, Dv, Dr, c, inverse, front,
+                         tlsphi_pair_density(a->rho, b->rho) * CC / 2, c_p, c_s, out->D_p);
     out->production = tlsphi_dot(dim, kind == TLSPH_SELF_ADJOINT ? Dr : Dv, out->D_p);
     out->D_J = 0;
     if (!with_J) return;
-    const tlsph_real DS = b->S - a->S, slope = (tlsphi_dot(width, a->slope_S, d) + tlsphi_dot(width, b->slope_S, d)) / 2;
+    tlsph_real slope;
+    tlsphi_multiply_mean(1, width, a->slope_S, b->slope_S, d, &slope);
+    const tlsph_real DS = b->S - a->S;
     out->D_J = tlsphi_jacobian_factor(jump_share, cc, CC, rho, c_p, (a->ratio + b->ratio) / 2) *
-               tlsphi_damped_jump(kind, DS, DS - slope, front);
+               tlsphi_damped_jump(kind, with_front, DS, DS - slope, front);
     out->production += DS * out->D_J;
 }
 
@@ -5576,7 +5581,7 @@ TLSPHI_INLINE void tlsphi_pair_heat(const tlsphi_heat_side *a, const tlsphi_heat
     tlsph_real d[3] = {0};
     TLSPHI_UNROLL for (int i = 0; i < width; i++) d[i] = b->X[i] - a->X[i];
     const tlsph_real slope = (tlsphi_dot(width, a->slope, d) + tlsphi_dot(width, b->slope, d)) / 2;
-    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, D_theta, D_theta - slope, 0);
+    const tlsph_real limited = tlsphi_damped_jump(TLSPH_LIMITED, 0, D_theta, D_theta - slope, 0);
     const tlsph_real into = k * tlsphi_choose(front, D_theta, limited);
     out->heat += into / tlsphi_choose(energy, one, a->theta);
     out->conduction = into * D_theta * tlsphi_inverse_or_0(2 * a->theta * b->theta);
@@ -5685,7 +5690,14 @@ typedef struct TLSPHI_ALIGNED tlsphi_lane_sums {
     tlsph_real T[3 * TLSPHI_LANES], damped[3 * TLSPHI_LANES];
     tlsph_real J[TLSPHI_LANES], production[TLSPHI_LANES];
     tlsph_real heat[TLSPHI_LANES], source[TLSPHI_LANES], conduction[TLSPHI_LANES];
+    tlsph_real approach[TLSPHI_LANES]; /* the least of the pairs: fronts where it is below 0 */
 } tlsphi_lane_sums;
+TLSPHI_INLINE void tlsphi_clear_damping(tlsphi_lane_sums *sum) {
+    tlsphi_clear_lanes(3, sum->damped);
+    tlsphi_clear_lanes(1, sum->J);
+    tlsphi_clear_lanes(1, sum->production);
+    tlsphi_clear_lanes(1, sum->approach);
+}
 
 /* The rows [first, end) of the tile itself, close together: that saves an address a row, which a compiler would keep and
    load again for every pair. */
@@ -5723,12 +5735,11 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
         sum->conduction[l] += heat.conduction;
     }
 }
-/* Writes the dissipation of a slot to `out` (T, J, production); returns whether a lane might be a front. */
-TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
-                                    const tlsph_real *pattern, const int dim, const int width, const size_t *columns,
-                                    const int with_J, const int kind, const int with_front, tlsph_real jump_share,
-                                    tlsphi_lane_sums *out) {
-    tlsphi_bits any = 0; /* of the width of a lane, so that lanes can be joined */
+/* Adds the dissipation of a slot. */
+TLSPHI_INLINE void tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                     const tlsph_real *pattern, const int dim, const int width, const size_t *columns,
+                                     const int with_J, const int kind, const int with_front, tlsph_real jump_share,
+                                     tlsphi_lane_sums *sum) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_damp_side side_a, side_b;
         tlsphi_damping flux;
@@ -5738,18 +5749,10 @@ TLSPHI_INLINE int tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, c
         tlsphi_take_components(width, columns, pattern + l, TLSPHI_LANES, g);
         tlsphi_pair_dissipate(&side_a, &side_b, g, pattern[(size_t)dim * TLSPHI_LANES + l], dim, width, with_J,
                               with_front, kind, 0, jump_share, &flux);
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) out->T[(size_t)i * TLSPHI_LANES + l] = flux.D_p[i];
-        out->J[l] = flux.D_J;
-        out->production[l] = flux.production;
-        any |= flux.approaches > 0 ? 1u : 0u;
-    }
-    return any != 0;
-}
-TLSPHI_INLINE void tlsphi_add_lanes(const int dim, const tlsphi_lane_sums *flux, tlsphi_lane_sums *sum) {
-    for (size_t i = 0; i < (size_t)dim * TLSPHI_LANES; i++) sum->T[i] += flux->T[i];
-    for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        sum->J[l] += flux->J[l];
-        sum->production[l] += flux->production[l];
+        TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->damped[(size_t)i * TLSPHI_LANES + l] += flux.D_p[i];
+        if (with_J) sum->J[l] += flux.D_J;
+        sum->production[l] += flux.production;
+        sum->approach[l] = tlsphi_min(sum->approach[l], flux.approach);
     }
 }
 /* The vectors of a slot without the pairs whose dissipation belongs to another pass, see [MULTI-RATE]. */
@@ -5780,17 +5783,30 @@ TLSPHI_INLINE void tlsphi_heat_slot(const tlsph_solver *s, const tlsphi_rows *r,
         tlsphi_heat_lanes(r, a, b, g, dim, 1, tlsphi_columns[axes], s->thermal, 1, 0, sum);
     else tlsphi_heat_lanes(r, a, b, g, dim, dim, all, s->thermal, 1, 0, sum);
 }
-TLSPHI_INLINE int tlsphi_limited_slot(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b, const tlsph_real *g,
-                                      const int dim, int axes, const int with_J, tlsph_real jump_share,
-                                      tlsphi_lane_sums *out) {
+TLSPHI_INLINE void tlsphi_limited_slot(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
+                                       const tlsph_real *g, const int dim, int axes, const int with_J, const int fronts,
+                                       tlsph_real share, tlsphi_lane_sums *sum) {
     const size_t *const columns = tlsphi_columns[axes], *const all = tlsphi_columns[7];
     const int width = tlsphi_widths[axes];
-    if (width == 1) return tlsphi_damp_lanes(r, a, b, g, dim, 1, columns, with_J, TLSPH_LIMITED, 0, jump_share, out);
-    if (width < dim) return tlsphi_damp_lanes(r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, 0, jump_share, out);
-    return tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 0, jump_share, out);
+    if (width == 1) tlsphi_damp_lanes(r, a, b, g, dim, 1, columns, with_J, TLSPH_LIMITED, fronts, share, sum);
+    else if (width < dim) tlsphi_damp_lanes(r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, fronts, share, sum);
+    else tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, fronts, share, sum);
+}
+TLSPHI_INLINE void tlsphi_damp_slot(const tlsph_solver *s, const tlsphi_rows *r, const tlsph_real *a,
+                                    const tlsph_real *b, const tlsph_real *g, const int dim, int axes,
+                                    const int with_J, tlsphi_lane_sums *sum) {
+    const size_t *const all = tlsphi_columns[7];
+    const tlsph_real share = s->jump_share;
+    if (s->dissipation == TLSPH_LIMITED) tlsphi_limited_slot(r, a, b, g, dim, axes, with_J, 0, share, sum);
+    else if (s->dissipation == TLSPH_FIRST_ORDER)
+        tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_FIRST_ORDER, 0, share, sum);
+    else if (s->dissipation == TLSPH_RECONSTRUCTED)
+        tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_RECONSTRUCTED, 0, share, sum);
+    else tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_SELF_ADJOINT, 0, share, sum);
 }
 TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
-                                     const int dim, const int with_J, int parts, tlsphi_lane_sums *sum) {
+                                     const int dim, const int with_J, const int fronts, int parts,
+                                     tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
     TLSPHI_ALIGNED tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
@@ -5801,40 +5817,38 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
         const tlsphi_slot *slot = graph->slot + k;
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
-        const size_t *const all = tlsphi_columns[7];
         const int column = slot->scattered && tlsphi_widths[slot->axes] == 1 && thin;
         const int axis = (int)tlsphi_columns[slot->axes][0];
         const tlsph_real *b = column ? tlsphi_gather_column(s, block, graph, slot, &r, axis, dim, rows)
                                      : tlsphi_gather(s, block, graph, slot, r.w, rows);
         if (parts & TLSPHI_STRESSES) tlsphi_stress_slot(&r, a, b, g, dim, slot->axes, sum);
         if (heats) tlsphi_heat_slot(s, &r, a, b, g, dim, slot->axes, sum);
-        if (!damps) continue;
         tlsph_real masked[4 * TLSPHI_LANES];
-        if (block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
-        tlsphi_lane_sums flux;
-        int front = 0;
-        if (s->dissipation == TLSPH_FIRST_ORDER)
-            tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_FIRST_ORDER, 0, s->jump_share, &flux);
-        else if (s->dissipation == TLSPH_RECONSTRUCTED)
-            tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_RECONSTRUCTED, 0, s->jump_share, &flux);
-        else if (s->dissipation == TLSPH_SELF_ADJOINT)
-            tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_SELF_ADJOINT, 0, s->jump_share, &flux);
-        else front = tlsphi_limited_slot(&r, a, b, g, dim, slot->axes, with_J, s->jump_share, &flux);
-        if (front && column) tlsphi_gather(s, block, graph, slot, r.P, r.wave);
-        if (front) tlsphi_damp_lanes(&r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, 1, s->jump_share, &flux);
-        tlsphi_add_lanes(dim, &flux, sum);
-        for (size_t i = 0; s->leaps && i < (size_t)dim * TLSPHI_LANES; i++) sum->damped[i] += flux.T[i];
+        if (damps && block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
+        if (!damps) continue;
+        if (fronts) tlsphi_limited_slot(&r, a, b, g, dim, slot->axes, with_J, 1, s->jump_share, sum);
+        else tlsphi_damp_slot(s, &r, a, b, g, dim, slot->axes, with_J, sum);
     }
 }
-#define TLSPHI_FLUX_SLOTS(dim, J)                                                                                      \
-    static void tlsphi_flux_slots_##dim##J(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, \
-                                           int parts, tlsphi_lane_sums *sum) {                                         \
-        tlsphi_flux_slots(s, block, tile, base, dim, J, parts, sum);                                                   \
+#define TLSPHI_FLUX_SLOTS(dim, J, fronts)                                                                              \
+    static void tlsphi_flux_slots_##dim##J##fronts(const tlsph_solver *s, const tlsphi_block *block, size_t tile,      \
+                                                   size_t base, int parts, tlsphi_lane_sums *sum) {                    \
+        tlsphi_flux_slots(s, block, tile, base, dim, J, fronts, parts, sum);                                           \
     }
-TLSPHI_FLUX_SLOTS(2, 0)
-TLSPHI_FLUX_SLOTS(2, 1)
-TLSPHI_FLUX_SLOTS(3, 0)
-TLSPHI_FLUX_SLOTS(3, 1)
+#define TLSPHI_EACH_FLUX(X) X(2, 0, 0) X(2, 0, 1) X(2, 1, 0) X(2, 1, 1) X(3, 0, 0) X(3, 0, 1) X(3, 1, 0) X(3, 1, 1)
+TLSPHI_EACH_FLUX(TLSPHI_FLUX_SLOTS)
+#define TLSPHI_CASE(dim, J, fronts)                                                                                    \
+    case 4 * (dim == 3) + 2 * J + fronts: tlsphi_flux_slots_##dim##J##fronts(s, block, tile, base, parts, sum); break;
+
+static void tlsphi_add_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int fronts,
+                             int parts, tlsphi_lane_sums *sum) {
+    switch ((s->dim == 3 ? 4 : 0) + (s->has_J ? 2 : 0) + fronts) {
+        TLSPHI_EACH_FLUX(TLSPHI_CASE)
+    default: break;
+    }
+}
+#undef TLSPHI_CASE
+#undef TLSPHI_EACH_FLUX
 /* P += P_D M of the particles [begin, end) of a tile (TLSPH_SELF_ADJOINT). Other tasks read no P meanwhile. */
 TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin,
                                        size_t end, const int dim) {
@@ -5848,13 +5862,14 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
         const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
         const tlsph_real *b = tlsphi_gather(s, block, graph, slot, r.w, r.P);
         tlsphi_lane_sums flux;
+        tlsphi_clear_damping(&flux);
         if (slot->scattered) tlsphi_gather(s, block, graph, slot, r.A, r.S);
         tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, 0, 0, &flux);
         for (size_t j = 0; j < D; j++) {
             const tlsph_real *X_a = a + ((size_t)r.X + j) * TLSPHI_LANES, *X_b = b + ((size_t)r.X + j) * TLSPHI_ROW;
             for (size_t i = 0; i < D; i++)
                 for (size_t l = 0; l < TLSPHI_LANES; l++)
-                    sum[(D * i + j) * TLSPHI_LANES + l] -= flux.T[i * TLSPHI_LANES + l] * (X_b[l] - X_a[l]);
+                    sum[(D * i + j) * TLSPHI_LANES + l] -= flux.damped[i * TLSPHI_LANES + l] * (X_b[l] - X_a[l]);
         }
     }
     for (size_t p = begin; p < end; p++) {
@@ -5875,17 +5890,30 @@ static void tlsphi_adjoint_block(tlsph_solver *s, tlsphi_block *block) {
         else tlsphi_adjoint_tile(s, block, tile, a, end, 2);
     }
 }
-/* Sums of a tile, whose first lane is particle `base`. */
-static void tlsphi_flux_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int parts,
+static int tlsphi_any_front(const tlsphi_lane_sums *sum) {
+    int any = 0;
+    for (size_t l = 0; l < TLSPHI_LANES; l++) any |= sum->approach[l] < 0;
+    return any;
+}
+/* Sums of a tile, whose first lane is particle `base`. To look for fronts takes nearly twice as long: that is done where
+   the tile had one last time, and once more, for the dissipation alone, where a new one shows. The sums are the same. */
+static void tlsphi_flux_tile(const tlsph_solver *s, tlsphi_block *block, size_t tile, size_t base, int parts,
                              tlsphi_lane_sums *sum) {
-    tlsph_real *const scalars[5] = {sum->J, sum->production, sum->heat, sum->source, sum->conduction};
+    const uint32_t bit = (uint32_t)1 << (tile - block->tile);
+    const int limited = s->dissipation == TLSPH_LIMITED && (parts & TLSPHI_DAMPING);
+    const int fronts = limited && (block->fronts & bit);
+    tlsph_real *const scalars[3] = {sum->heat, sum->source, sum->conduction};
     tlsphi_clear_lanes(3, sum->T);
-    tlsphi_clear_lanes(3, sum->damped);
-    for (int i = 0; i < 5; i++) tlsphi_clear_lanes(1, scalars[i]);
-    if (s->dim == 3 && s->has_J) tlsphi_flux_slots_31(s, block, tile, base, parts, sum);
-    else if (s->dim == 3) tlsphi_flux_slots_30(s, block, tile, base, parts, sum);
-    else if (s->has_J) tlsphi_flux_slots_21(s, block, tile, base, parts, sum);
-    else tlsphi_flux_slots_20(s, block, tile, base, parts, sum);
+    for (int i = 0; i < 3; i++) tlsphi_clear_lanes(1, scalars[i]);
+    tlsphi_clear_damping(sum);
+    tlsphi_add_slots(s, block, tile, base, fronts, parts, sum);
+    if (limited) block->fronts &= ~bit;
+    if (limited && tlsphi_any_front(sum)) {
+        block->fronts |= bit;
+        if (!fronts) tlsphi_clear_damping(sum);
+        if (!fronts) tlsphi_add_slots(s, block, tile, base, 1, TLSPHI_DAMPING, sum);
+    }
+    for (size_t i = 0; i < 3 * TLSPHI_LANES; i++) sum->T[i] += sum->damped[i];
 }
 /* Those of the lanes [first, last), one by one. */
 static void tlsphi_part_lanes(const tlsphi_lane_sums *sum, int dim, size_t first, size_t last, tlsphi_gathered *out) {

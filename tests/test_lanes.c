@@ -97,6 +97,29 @@ TEST(fronts) /* faster than TLSPH_FRONT_LOW of the p speed between neighbours */
     s.mooney = 0.25;
     compare_all(s, 20);
 }
+/* A tile looks for fronts where it had one last time. A solver that knows of none, as after a checkpoint, takes them the
+   other way, and gets the same bits. */
+TEST(fronts_that_were_not_known)
+{
+    moving_block s = body(3, 0);
+    tlsph_solver *one = NULL;
+    s.unknowns = TLSPH_PFHJ;
+    REQUIRE_OK(moving_block_create(&s, &one, NULL));
+    CHECK_RESULT(moving_block_kick(one, 20), TLSPH_OK);
+    for (int step = 0; step < 10; step++) {
+        tlsph_solver *other = NULL;
+        size_t size = 0;
+        unsigned char *saved = save_state(one, &size);
+        REQUIRE_OK(moving_block_create(&s, &other, NULL));
+        CHECK_RESULT(tlsph_restore(other, saved, size), TLSPH_OK);
+        CHECK_RESULT(take_steps(one, 1), TLSPH_OK);
+        CHECK_RESULT(take_steps(other, 1), TLSPH_OK);
+        CHECK(state_hash(one) == state_hash(other));
+        free(saved);
+        tlsph_destroy(other);
+    }
+    tlsph_destroy(one);
+}
 TEST(leapfrog)
 {
     moving_block s = body(3, 0);
@@ -179,5 +202,5 @@ TEST(temperatures_of_round_off)
     tlsph_cloud_destroy(&cloud);
 }
 
-SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(fronts), ENTRY(leapfrog), ENTRY(other_dissipations),
-      ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
+SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
+      ENTRY(leapfrog), ENTRY(other_dissipations), ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
