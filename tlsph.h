@@ -5804,13 +5804,15 @@ TLSPHI_INLINE void tlsphi_damp_slot(const tlsph_solver *s, const tlsphi_rows *r,
         tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_RECONSTRUCTED, 0, share, sum);
     else tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_SELF_ADJOINT, 0, share, sum);
 }
+/* fronts: the dissipation with a look for fronts, and nothing else. */
 TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
                                      const int dim, const int with_J, const int fronts, int parts,
                                      tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
     TLSPHI_ALIGNED tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
-    const int heats = s->heat_moves && (parts & TLSPHI_STRESSES), rows = heats ? r.count : with_J ? r.theta : r.S;
+    const int stresses = !fronts && (parts & TLSPHI_STRESSES), heats = s->heat_moves && stresses;
+    const int rows = heats ? r.count : with_J ? r.theta : r.S;
     const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
     const int thin = (!damps || s->dissipation == TLSPH_LIMITED) && (!heats || (s->conduction == TLSPH_COMPACT && !s->M));
     tlsphi_take_tile(tlsphi_at(s, 0, base), r.w, rows, a);
@@ -5821,7 +5823,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         const int axis = (int)tlsphi_columns[slot->axes][0];
         const tlsph_real *b = column ? tlsphi_gather_column(s, block, graph, slot, &r, axis, dim, rows)
                                      : tlsphi_gather(s, block, graph, slot, r.w, rows);
-        if (parts & TLSPHI_STRESSES) tlsphi_stress_slot(&r, a, b, g, dim, slot->axes, sum);
+        if (stresses) tlsphi_stress_slot(&r, a, b, g, dim, slot->axes, sum);
         if (heats) tlsphi_heat_slot(s, &r, a, b, g, dim, slot->axes, sum);
         tlsph_real masked[4 * TLSPHI_LANES];
         if (damps && block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
@@ -5896,22 +5898,21 @@ static int tlsphi_any_front(const tlsphi_lane_sums *sum) {
     return any;
 }
 /* Sums of a tile, whose first lane is particle `base`. To look for fronts takes nearly twice as long: that is done where
-   the tile had one last time, and once more, for the dissipation alone, where a new one shows. The sums are the same. */
+   the tile had one last time, and where a new one shows, in place of what was taken without. The sums are the same. */
 static void tlsphi_flux_tile(const tlsph_solver *s, tlsphi_block *block, size_t tile, size_t base, int parts,
                              tlsphi_lane_sums *sum) {
     const uint32_t bit = (uint32_t)1 << (tile - block->tile);
     const int limited = s->dissipation == TLSPH_LIMITED && (parts & TLSPHI_DAMPING);
-    const int fronts = limited && (block->fronts & bit);
+    const int known = limited && (block->fronts & bit), rest = known ? parts & ~TLSPHI_DAMPING : parts;
     tlsph_real *const scalars[3] = {sum->heat, sum->source, sum->conduction};
     tlsphi_clear_lanes(3, sum->T);
     for (int i = 0; i < 3; i++) tlsphi_clear_lanes(1, scalars[i]);
     tlsphi_clear_damping(sum);
-    tlsphi_add_slots(s, block, tile, base, fronts, parts, sum);
-    if (limited) block->fronts &= ~bit;
-    if (limited && tlsphi_any_front(sum)) {
-        block->fronts |= bit;
-        if (!fronts) tlsphi_clear_damping(sum);
-        if (!fronts) tlsphi_add_slots(s, block, tile, base, 1, TLSPHI_DAMPING, sum);
+    if (rest) tlsphi_add_slots(s, block, tile, base, 0, rest, sum);
+    if (known || (limited && tlsphi_any_front(sum))) {
+        tlsphi_clear_damping(sum);
+        tlsphi_add_slots(s, block, tile, base, 1, TLSPHI_DAMPING, sum);
+        block->fronts = tlsphi_any_front(sum) ? block->fronts | bit : block->fronts & ~bit;
     }
     for (size_t i = 0; i < 3 * TLSPHI_LANES; i++) sum->T[i] += sum->damped[i];
 }
