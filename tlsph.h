@@ -911,13 +911,6 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #define TLSPHI_APART static
 #endif
 
-/* Asks for memory that is read or written soon. */
-#if defined(__GNUC__) || defined(__clang__)
-#define TLSPHI_PREFETCH(address) __builtin_prefetch(address)
-#else
-#define TLSPHI_PREFETCH(address) ((void)(address))
-#endif
-
 /* gcc leaves loops over the 2 or 3 components rolled at -O2 unless asked; clang unrolls them by itself. */
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 8
 #define TLSPHI_UNROLL _Pragma("GCC unroll 9")
@@ -932,7 +925,7 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #pragma clang diagnostic ignored "-Wpass-failed"
 #define TLSPHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #elif defined(__GNUC__) && __GNUC__ >= 8
-#define TLSPHI_EACH_LANE _Pragma("GCC ivdep")
+#define TLSPHI_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
 #else
 #define TLSPHI_EACH_LANE
 #endif
@@ -3316,49 +3309,52 @@ static void tlsphi_respond_linear(const tlsphi_material *m, const tlsph_real *F,
     out->s_modulus[1] = 0;
 }
 
-/* The built-in laws at F with deviatoric arguments (H, Jd) and volumetric argument J. e_F holds the whole deviatoric
-   part a F + b H x F + c H (for MEE it is -theta_R eta_F). `dev` returns a, b, c for conjugates. */
-TLSPHI_INLINE void tlsphi_respond_inline(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H,
-                                         tlsph_real Jd, tlsph_real J, int coupled, tlsph_response *out,
-                                         tlsphi_deviator *dev) {
-    const tlsph_real I1 = tlsphi_dot(9, F, F), I2 = tlsphi_dot(9, H, H);
-    tlsph_real S[9];
-    *dev = tlsphi_deviatoric(m, I1, I2, Jd);
-    for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
-    if (m->mooney) {
-        tlsph_real HxF[9];
-        tlsphi_cross_inline(H, F, HxF);
-        for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
-    }
+/* The built-in laws but for e_F and eta_F, with what the deviatoric arguments give, at J. */
+TLSPHI_INLINE void tlsphi_respond_scalars(const tlsphi_material *m, const tlsphi_deviator *dev,
+                                          const tlsphi_invariants *s, tlsph_real J, int coupled, tlsph_response *out) {
     const tlsph_real u = m->k / 2 * (J - 1) * (J - 1), du = m->k * (J - 1), thermal = m->beta * m->theta_R;
     const tlsph_real per_theta = 1 / m->theta_R; /* once for all lanes: a division a component took half of the time */
     if (m->entropic) {
         out->energy = thermal * (J - 1);
         out->entropy = (out->energy - dev->psi - u) * per_theta;
-        for (int i = 0; i < 9; i++) {
-            out->e_F[i] = 0;
-            out->eta_F[i] = -S[i] * per_theta;
-        }
         out->e_J = thermal;
         out->eta_J = m->beta - du * per_theta;
     } else {
         const tlsph_real power = m->q == 1 ? J : m->q == 0 ? 1 : tlsphi_pow(J, m->q);
         out->energy = dev->psi + u + thermal * (J - 1);
         out->entropy = m->q == 0 ? (m->beta == 0 ? 0 : m->beta * tlsphi_log(J)) : m->beta * (power - 1) / m->q;
-        for (int i = 0; i < 9; i++) {
-            out->e_F[i] = S[i];
-            out->eta_F[i] = 0;
-        }
         out->e_J = du + thermal;
         out->eta_J = m->q == 1 ? m->beta : m->beta * power / J;
     }
-    const tlsphi_invariants spread = tlsphi_principal_bounds(I1, I2, Jd);
-    tlsphi_moduli(m, dev, &spread, coupled, out);
+    tlsphi_moduli(m, dev, s, coupled, out);
+}
+/* The deviatoric part a F + b H x F + c H as e_F, for MEE as -theta_R eta_F. */
+TLSPHI_INLINE void tlsphi_respond_tensors(const tlsphi_material *m, const tlsphi_deviator *dev, const tlsph_real *F,
+                                          const tlsph_real *H, tlsph_response *out) {
+    const tlsph_real per_theta = 1 / m->theta_R;
+    tlsph_real S[9];
+    for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
+    if (m->mooney) {
+        tlsph_real HxF[9];
+        tlsphi_cross_inline(H, F, HxF);
+        for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
+    }
+    for (int i = 0; i < 9; i++) {
+        out->e_F[i] = m->entropic ? 0 : S[i];
+        out->eta_F[i] = m->entropic ? -S[i] * per_theta : 0;
+    }
 }
 static void tlsphi_respond(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *H, tlsph_real Jd,
                            tlsph_real J, int coupled, tlsph_response *out, tlsphi_deviator *dev) {
-    if (m->kind == TLSPH_LINEAR) tlsphi_respond_linear(m, F, J, coupled, out, dev);
-    else tlsphi_respond_inline(m, F, H, Jd, J, coupled, out, dev);
+    if (m->kind == TLSPH_LINEAR) {
+        tlsphi_respond_linear(m, F, J, coupled, out, dev);
+        return;
+    }
+    const tlsph_real I1 = tlsphi_dot(9, F, F), I2 = tlsphi_dot(9, H, H);
+    const tlsphi_invariants spread = tlsphi_principal_bounds(I1, I2, Jd);
+    *dev = tlsphi_deviatoric(m, I1, I2, Jd);
+    tlsphi_respond_scalars(m, dev, &spread, J, coupled, out);
+    tlsphi_respond_tensors(m, dev, F, H, out);
 }
 
 /* W(phi)/(b0 mu), W' and W'' of the drift potential. */
@@ -3858,8 +3854,8 @@ TLSPHI_INLINE tlsph_real *tlsphi_at(const tlsph_solver *s, int row, size_t a) {
 /* -- bodies larger than the cache --
    To the processor the rows of a tile are some forty streams, more than it follows by itself, and the tile waits for
    each. So a pass first reads what its next block will need once through, a cache line after the other, at more than
-   twice the speed: that saves a fifth of a step. So many prefetches in place of the reads gained nothing; the few of
-   tlsphi_prefetch_rows are for rows that are only written. Smaller bodies would lose up to 3 %. */
+   twice the speed: that saves a fifth of a step. So many prefetches in place of the reads gained nothing. Smaller
+   bodies would lose up to 3 %. */
 #ifndef TLSPHI_CACHED /* tests set 0 */
 #define TLSPHI_CACHED ((size_t)8 << 20) /* bytes */
 #endif
@@ -3887,11 +3883,6 @@ static size_t tlsphi_reach_ahead(const tlsph_solver *s, const tlsphi_block *bloc
             if (b[l] > last && b[l] < next->begin + 4 * TLSPHI_STRIP) last = b[l];
     }
     return last;
-}
-/* Asks for the rows [first, end) of the tile behind the one whose row 0 is at `at`. At the end of a block this asks for
-   its spare columns, in vain but in bounds. */
-TLSPHI_INLINE void tlsphi_prefetch_rows(const tlsph_real *at, int first, int end) {
-    for (int r = first; r < end; r++) TLSPHI_PREFETCH(at + (size_t)r * TLSPHI_ROW + TLSPHI_LANES);
 }
 TLSPHI_INLINE void tlsphi_take_apart(const int n, const tlsph_real *at, const size_t apart, tlsph_real *out) {
     TLSPHI_UNROLL for (int i = 0; i < n; i++) out[i] = at[(size_t)i * apart];
@@ -4294,117 +4285,218 @@ static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t
     return 1;
 }
 
-/* -- the same for a tile of one material, by lanes: the built-in laws but for powers of J -- */
+/* -- the same for tiles of one material, by lanes: the built-in laws but for powers of J --
+   From F to c_p each number of a particle waits for the one before, over more operations than a processor looks ahead.
+   So this goes in parts, each for a few tiles before the next begins: the processor then works at several tiles at a
+   time, which takes half as long. */
 
-/* A tile's state as lanes. */
+#define TLSPHI_RUN ((size_t)4) /* tiles; their lanes should stay in the first cache */
+
+/* A tile's state, and what one part leaves for the next. */
 typedef struct TLSPHI_ALIGNED tlsphi_state_lanes {
-    tlsph_real v[3 * TLSPHI_LANES], J[TLSPHI_LANES], E[TLSPHI_LANES], c_p[TLSPHI_LANES];
-    tlsph_real heat[TLSPHI_LANES], ratio[TLSPHI_LANES], good[TLSPHI_LANES];
-    const tlsph_real *F, *H;
+    tlsph_real v[3 * TLSPHI_LANES], kinetic[TLSPHI_LANES], d[TLSPHI_LANES], J[TLSPHI_LANES];
+    tlsph_real I1[TLSPHI_LANES], I2[TLSPHI_LANES], L1[TLSPHI_LANES], LH[TLSPHI_LANES], l3[TLSPHI_LANES];
+    tlsph_real psi[TLSPHI_LANES], a[TLSPHI_LANES], b[TLSPHI_LANES], c[TLSPHI_LANES];
+    tlsph_real J23[TLSPHI_LANES], per_J[TLSPHI_LANES];
+    tlsph_real energy[TLSPHI_LANES], entropy[TLSPHI_LANES], e_J[TLSPHI_LANES], eta_J[TLSPHI_LANES];
+    tlsph_real p_modulus[2 * TLSPHI_LANES], s_modulus[2 * TLSPHI_LANES], drift[TLSPHI_LANES], ratio[TLSPHI_LANES];
+    tlsph_real theta[TLSPHI_LANES], Sigma_J[TLSPHI_LANES], c_p[TLSPHI_LANES], good[TLSPHI_LANES];
 } tlsphi_state_lanes;
 
-static int tlsphi_takes_lanes(const tlsph_solver *s, size_t begin, size_t end) {
-    const tlsphi_material *m = tlsphi_material_of(s, begin);
-    if (end - begin < TLSPHI_LANES || s->audit || s->incompressible || s->least_stretch || s->metal ||
-        s->coupling == TLSPH_JOINT_AS_PRINTED || !tlsphi_has_invariants(m->kind) || m->q != 1 || (s->has_H && m->mooney))
-        return 0;
-    for (size_t a = begin; a < end; a++)
-        if (tlsphi_material_of(s, a) != m || tlsphi_mirrors_of(s, a)) return 0;
-    return 1;
-}
 /* n components a particle become n lanes. */
 TLSPHI_INLINE void tlsphi_transpose(const tlsph_real *from, const size_t n, tlsph_real *to) {
-    for (size_t l = 0; l < TLSPHI_LANES; l++)
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (size_t i = 0; i < n; i++) to[i * TLSPHI_LANES + l] = from[n * l + i];
 }
-/* Takes F and H from the lanes, completed in plane strain; H = cof F where it is not evolved. d is a number of
-   its own: clang turns a choice between two members into one of addresses, and then makes no vectors. */
-TLSPHI_INLINE void tlsphi_take_measures(const tlsphi_state_lanes *x, size_t l, const int dim, const int has_H, int has_J,
+/* F and H of lane l of the tile at `begin`, completed in plane strain; H = cof F where it is not evolved. d is a number
+   of its own: clang turns a choice between two members into one of addresses, and then makes no vectors. */
+TLSPHI_INLINE void tlsphi_take_measures(const tlsph_solver *s, size_t begin, size_t l, const int dim, const int has_H,
                                         tlsphi_point *pt) {
+    const size_t at = (size_t)(dim * dim) * begin + l;
     tlsph_real F[9], H[9];
-    TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) F[i] = x->F[(size_t)i * TLSPHI_LANES + l];
+    tlsphi_take_apart(dim * dim, s->now.F + at, TLSPHI_LANES, F);
     tlsphi_expand(dim, F, 1, pt->F);
     tlsphi_cofactor_inline(pt->F, pt->H);
     const tlsph_real d = pt->F[0] * pt->H[0] + pt->F[1] * pt->H[1] + pt->F[2] * pt->H[2];
     if (has_H) {
-        TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) H[i] = x->H[(size_t)i * TLSPHI_LANES + l];
+        tlsphi_take_apart(dim * dim, s->now.H + at, TLSPHI_LANES, H);
         tlsphi_expand(dim, H, d, pt->H);
     }
     pt->d = d;
-    pt->J = has_J ? x->J[l] : d;
 }
-/* Writes the rows of a tile at `row`, c_p, and whether all is well. dim, has_H, entropic, mooney are constants. */
-TLSPHI_INLINE void tlsphi_constitute_lanes(const tlsph_solver *s, const tlsphi_material *given, tlsphi_state_lanes *x,
-                                           tlsph_real *row, const int dim, const int has_H, const int entropic,
-                                           const int mooney) {
-    const int dd = dim * dim, has_J = s->has_J, heated = s->thermal != TLSPH_ISOTHERMAL, conducts = s->conducts;
-    /* factors 0 or 1, as a choice would keep gcc from making vectors */
-    const tlsph_real by_energy = s->thermal == TLSPH_ENERGY, by_entropy = s->thermal == TLSPH_ENTROPY;
-    const tlsphi_rows r = s->rows;
-    const tlsph_real stiffness = has_J ? s->drift_stiffness * given->mu : 0, scale = s->drift_scale;
-    const tlsph_real per_c_v = heated ? 1 / given->c_v : 0; /* isothermal scenes may have none */
+TLSPHI_INLINE void tlsphi_measure_lanes(const tlsph_solver *s, size_t begin, const int dim, const int has_H,
+                                        tlsphi_state_lanes *x) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsphi_point pt;
+        tlsphi_take_measures(s, begin, l, dim, has_H, &pt);
+        x->I1[l] = tlsphi_dot(9, pt.F, pt.F);
+        x->I2[l] = tlsphi_dot(9, pt.H, pt.H);
+        x->d[l] = pt.d;
+    }
+}
+/* What of the state the laws depend on. */
+TLSPHI_INLINE void tlsphi_load_tile(const tlsph_solver *s, const tlsphi_material *m, size_t begin, const int dim,
+                                    tlsphi_state_lanes *x) {
+    const size_t D = (size_t)dim;
+    const tlsph_real per_rho = 1 / m->rho, half = m->rho / 2;
+    tlsphi_transpose(s->now.p + D * begin, D, x->v);
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real square = 0;
+        TLSPHI_UNROLL for (size_t i = 0; i < D; i++) {
+            const tlsph_real v = x->v[i * TLSPHI_LANES + l] * per_rho;
+            x->v[i * TLSPHI_LANES + l] = v;
+            square += v * v;
+        }
+        x->kinetic[l] = square * half;
+    }
+    if (s->has_H) tlsphi_measure_lanes(s, begin, dim, 1, x);
+    else tlsphi_measure_lanes(s, begin, dim, 0, x);
+    const tlsph_real theta_R = m->theta_R, *J = s->has_J ? s->now.J + begin : x->d;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        x->J[l] = J[l];
+        x->theta[l] = theta_R; /* isothermal; others follow */
+    }
+}
+/* `mooney` and `entropic` are constants here and below. */
+TLSPHI_INLINE void tlsphi_deviate_lanes(const tlsphi_material *given, const int mooney, size_t tiles,
+                                        tlsphi_state_lanes *x) {
+    tlsphi_material m = *given;
+    m.mooney = mooney;
+    for (; tiles > 0; tiles--, x++)
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+            const tlsphi_deviator dev = tlsphi_deviatoric(&m, x->I1[l], x->I2[l], x->d[l]);
+            const tlsphi_invariants spread = tlsphi_principal_bounds(x->I1[l], x->I2[l], x->d[l]);
+            x->psi[l] = dev.psi;
+            x->a[l] = dev.a;
+            x->b[l] = mooney ? dev.b : 0;
+            x->c[l] = dev.c;
+            x->J23[l] = dev.J23;
+            x->per_J[l] = dev.per_J;
+            x->L1[l] = spread.L1;
+            x->LH[l] = spread.LH;
+            x->l3[l] = mooney ? spread.l3 : 0; /* a division */
+        }
+}
+TLSPHI_INLINE tlsphi_deviator tlsphi_take_deviator(const tlsphi_state_lanes *x, size_t l) {
+    tlsphi_deviator dev;
+    dev.psi = x->psi[l];
+    dev.a = x->a[l];
+    dev.b = x->b[l];
+    dev.c = x->c[l];
+    dev.J23 = x->J23[l];
+    dev.per_J = x->per_J[l];
+    return dev;
+}
+TLSPHI_INLINE void tlsphi_respond_lanes(const tlsph_solver *s, const tlsphi_material *given, const int entropic,
+                                        const int mooney, size_t tiles, tlsphi_state_lanes *x) {
+    const tlsph_real stiffness = s->has_J ? s->drift_stiffness * given->mu : 0, scale = s->drift_scale;
+    const int heated = s->thermal != TLSPH_ISOTHERMAL;
     tlsphi_material m = *given;
     m.entropic = entropic;
     m.mooney = mooney;
     m.q = 1;
-    tlsph_real *const P = row + (size_t)r.PM * TLSPHI_ROW, *const A = row + (size_t)r.A * TLSPHI_ROW;
-    tlsph_real *const wave = row + (size_t)r.wave * TLSPHI_ROW;
-    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        tlsphi_point pt;
-        tlsph_real out[9];
-        tlsphi_take_measures(x, l, dim, has_H, has_J, &pt);
-        tlsphi_respond_inline(&m, pt.F, pt.H, pt.d, pt.J, heated, &pt.r, &pt.dev);
-        pt.Sigma_J = tlsphi_add_drift(&m, stiffness, scale, &pt);
-        pt.kinetic = 0;
-        TLSPHI_UNROLL for (int i = 0; i < dim; i++) pt.kinetic +=
-            x->v[(size_t)i * TLSPHI_LANES + l] * x->v[(size_t)i * TLSPHI_LANES + l];
-        pt.kinetic *= m.rho / 2;
-        const tlsph_real elastic = by_energy * pt.r.energy + by_entropy * pt.r.entropy;
-        const tlsph_real heat = (x->E[l] - by_energy * pt.kinetic - elastic) * per_c_v;
-        const tlsph_real theta = m.theta_R * tlsphi_exp(by_entropy * heat) + by_energy * heat;
-        tlsphi_conclude(&m, theta, pt.r.e_J - theta * pt.r.eta_J, &pt);
-        tlsphi_shrink(dim, pt.P, out);
-        TLSPHI_UNROLL for (int i = 0; i < dd; i++) P[(size_t)i * TLSPHI_ROW + l] = out[i];
-        tlsphi_shrink(dim, pt.H, out);
-        TLSPHI_UNROLL for (int i = 0; i < dd; i++) A[(size_t)i * TLSPHI_ROW + l] = out[i];
-        wave[l] = x->c_p[l] = pt.c_p;
-        wave[TLSPHI_ROW + l] = pt.c_s;
-        x->ratio[l] = pt.drift_ratio;
-        x->J[l] = pt.J;
-        x->E[l] = theta;
-        x->heat[l] = pt.Sigma_J;
-        tlsph_real all = pt.d + pt.J + heat + theta + pt.c_p + pt.kinetic; /* finite only if all of them are */
-        TLSPHI_UNROLL for (int i = 0; i < 9; i++) all += pt.P[i];
-        x->good[l] = (pt.d > 0) & (pt.J > 0) & (theta > 0) & tlsphi_finite(all) ? TLSPHI_R(1) : TLSPHI_R(0);
-    }
-    for (size_t l = 0; has_J && l < TLSPHI_LANES; l++) {
-        row[(size_t)r.S * TLSPHI_ROW + l] = x->heat[l];
-        wave[3 * TLSPHI_ROW + l] = x->ratio[l];
-    }
-    for (size_t l = 0; heated && l < TLSPHI_LANES; l++) row[(size_t)r.theta * TLSPHI_ROW + l] = x->E[l];
-    for (size_t l = 0; conducts && l < TLSPHI_LANES; l++) row[(size_t)r.h_J * TLSPHI_ROW + l] = m.h / x->J[l];
+    for (; tiles > 0; tiles--, x++)
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+            const tlsphi_invariants spread = {x->I1[l], x->I2[l], x->d[l], x->L1[l], x->LH[l], x->l3[l]};
+            tlsphi_point pt;
+            pt.d = x->d[l];
+            pt.J = x->J[l];
+            pt.dev = tlsphi_take_deviator(x, l);
+            tlsphi_respond_scalars(&m, &pt.dev, &spread, pt.J, heated, &pt.r);
+            x->drift[l] = tlsphi_add_drift(&m, stiffness, scale, &pt);
+            x->ratio[l] = pt.drift_ratio;
+            x->energy[l] = pt.r.energy;
+            x->entropy[l] = pt.r.entropy;
+            x->e_J[l] = pt.r.e_J;
+            x->eta_J[l] = pt.r.eta_J;
+            TLSPHI_UNROLL for (size_t i = 0; i < 2; i++) {
+                x->p_modulus[i * TLSPHI_LANES + l] = pt.r.p_modulus[i];
+                x->s_modulus[i * TLSPHI_LANES + l] = pt.r.s_modulus[i];
+            }
+        }
 }
-#define TLSPHI_CONSTITUTE(dim, H, entropic, mooney)                                                                    \
-    static void tlsphi_constitute_##dim##H##entropic##mooney(const tlsph_solver *s, const tlsphi_material *m,          \
-                                                             tlsphi_state_lanes *x, tlsph_real *row) {                 \
-        tlsphi_constitute_lanes(s, m, x, row, dim, H, entropic, mooney);                                               \
+/* theta is not finite where E, or what it is compared with, is not. */
+static void tlsphi_temperature_lanes(const tlsph_solver *s, const tlsphi_material *m, size_t begin,
+                                     tlsphi_state_lanes *x) {
+    const tlsph_real theta_R = m->theta_R, per_c_v = 1 / m->c_v, *E = s->now.E + begin;
+    if (s->thermal == TLSPH_ENERGY) {
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+            x->theta[l] = theta_R + (E[l] - x->kinetic[l] - x->energy[l]) * per_c_v;
+        return;
     }
-#define TLSPHI_CONSTITUTIONS(X)                                                                                        \
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const tlsph_real heat = (E[l] - x->entropy[l]) * per_c_v;
+        x->theta[l] = theta_R * tlsphi_exp(heat) + 0 * heat;
+    }
+}
+/* Writes P and H to their rows, the wave speeds, and whether all is well. */
+TLSPHI_INLINE void tlsphi_conclude_lanes(const tlsph_solver *s, const tlsphi_material *given, const int dim,
+                                         const int has_H, const int entropic, const int mooney, size_t begin,
+                                         size_t tiles, tlsphi_state_lanes *x) {
+    const size_t dd = (size_t)(dim * dim);
+    tlsphi_material m = *given;
+    m.entropic = entropic;
+    m.mooney = mooney;
+    for (; tiles > 0; tiles--, x++, begin += TLSPHI_LANES) {
+        tlsph_real *const P = tlsphi_at(s, s->rows.PM, begin), *const A = tlsphi_at(s, s->rows.A, begin);
+        tlsph_real *const wave = tlsphi_at(s, s->rows.wave, begin);
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+            tlsphi_point pt;
+            tlsph_real out[9], theta = x->theta[l];
+            tlsphi_take_measures(s, begin, l, dim, has_H, &pt);
+            pt.dev = tlsphi_take_deviator(x, l);
+            tlsphi_respond_tensors(&m, &pt.dev, pt.F, pt.H, &pt.r);
+            tlsphi_take_apart(2, x->p_modulus + l, TLSPHI_LANES, pt.r.p_modulus);
+            tlsphi_take_apart(2, x->s_modulus + l, TLSPHI_LANES, pt.r.s_modulus);
+            pt.Sigma_J = x->drift[l];
+            tlsphi_conclude(&m, theta, x->e_J[l] - theta * x->eta_J[l], &pt);
+            tlsphi_shrink(dim, pt.P, out);
+            TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) P[i * TLSPHI_ROW + l] = out[i];
+            tlsphi_shrink(dim, pt.H, out);
+            TLSPHI_UNROLL for (size_t i = 0; i < dd; i++) A[i * TLSPHI_ROW + l] = out[i];
+            wave[l] = x->c_p[l] = pt.c_p;
+            wave[TLSPHI_ROW + l] = pt.c_s;
+            x->Sigma_J[l] = pt.Sigma_J;
+            tlsph_real all = x->d[l] + x->J[l] + theta + pt.c_p + x->kinetic[l]; /* finite only if all of them are */
+            TLSPHI_UNROLL for (int i = 0; i < 9; i++) all += pt.P[i];
+            x->good[l] = (x->d[l] > 0) & (x->J[l] > 0) & (theta > 0) & tlsphi_finite(all) ? TLSPHI_R(1) : TLSPHI_R(0);
+        }
+    }
+}
+#define TLSPHI_CONCLUDE(dim, H, entropic, mooney)                                                                      \
+    static void tlsphi_conclude_##dim##H##entropic##mooney(const tlsph_solver *s, const tlsphi_material *m,            \
+                                                           size_t begin, size_t tiles, tlsphi_state_lanes *x) {        \
+        tlsphi_conclude_lanes(s, m, dim, H, entropic, mooney, begin, tiles, x);                                        \
+    }
+#define TLSPHI_CONCLUSIONS(X)                                                                                          \
     X(2, 0, 0, 0) X(2, 0, 0, 1) X(2, 0, 1, 0) X(2, 0, 1, 1) X(2, 1, 0, 0) X(2, 1, 1, 0)                                \
     X(3, 0, 0, 0) X(3, 0, 0, 1) X(3, 0, 1, 0) X(3, 0, 1, 1) X(3, 1, 0, 0) X(3, 1, 1, 0)
-TLSPHI_CONSTITUTIONS(TLSPHI_CONSTITUTE)
+TLSPHI_CONCLUSIONS(TLSPHI_CONCLUDE)
 #define TLSPHI_CASE(dim, H, entropic, mooney)                                                                          \
-    case 8 * (dim == 3) + 4 * H + 2 * entropic + mooney: tlsphi_constitute_##dim##H##entropic##mooney(s, m, x, row); break;
+    case 8 * (dim == 3) + 4 * H + 2 * entropic + mooney:                                                               \
+        tlsphi_conclude_##dim##H##entropic##mooney(s, m, begin, tiles, x);                                             \
+        break;
 
-static void tlsphi_constitute_tile(const tlsph_solver *s, const tlsphi_material *m, tlsphi_state_lanes *x,
-                                   tlsph_real *row) {
+static void tlsphi_constitute_tiles(const tlsph_solver *s, const tlsphi_material *m, size_t begin, size_t tiles,
+                                    tlsphi_state_lanes *x) {
+    if (m->mooney) tlsphi_deviate_lanes(m, 1, tiles, x);
+    else tlsphi_deviate_lanes(m, 0, tiles, x);
+    if (m->entropic && m->mooney) tlsphi_respond_lanes(s, m, 1, 1, tiles, x);
+    else if (m->entropic) tlsphi_respond_lanes(s, m, 1, 0, tiles, x);
+    else if (m->mooney) tlsphi_respond_lanes(s, m, 0, 1, tiles, x);
+    else tlsphi_respond_lanes(s, m, 0, 0, tiles, x);
+    for (size_t i = 0; s->thermal && i < tiles; i++) tlsphi_temperature_lanes(s, m, begin + i * TLSPHI_LANES, x + i);
     switch ((s->dim == 3 ? 8 : 0) + (s->has_H ? 4 : 0) + (m->entropic ? 2 : 0) + (m->mooney ? 1 : 0)) {
-        TLSPHI_CONSTITUTIONS(TLSPHI_CASE)
-    default: break; /* no laws of Mooney with H, see tlsphi_takes_lanes */
+        TLSPHI_CONCLUSIONS(TLSPHI_CASE)
+    default: break; /* no laws of Mooney with H, see tlsphi_count_tiles */
     }
 }
 #undef TLSPHI_CASE
-#undef TLSPHI_CONSTITUTIONS
+#undef TLSPHI_CONCLUSIONS
+TLSPHI_INLINE void tlsphi_put_lanes(const int rows, const tlsph_real *lanes, tlsph_real *row) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)rows; i++) row[i * TLSPHI_ROW + l] = lanes[i * TLSPHI_LANES + l];
+}
 /* P M and H M in the rows of a tile. */
 TLSPHI_INLINE void tlsphi_correct_rows(const tlsph_real *M, tlsph_real *row, const int dim) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
@@ -4420,14 +4512,13 @@ static tlsph_real tlsphi_least_lane(const tlsph_real *lanes) {
     for (size_t l = 0; l < TLSPHI_LANES; l++) least = tlsphi_min(least, lanes[l]);
     return least;
 }
-/* Longest steps of the particles of a tile: as tlsphi_particle_step. */
-static void tlsphi_tile_step(tlsph_solver *s, tlsphi_block *block, size_t begin, const tlsphi_state_lanes *x) {
+/* Lowers dt to the longest steps of the particles of a tile, but for cfl: as tlsphi_particle_step. */
+static void tlsphi_tile_step(const tlsph_solver *s, size_t begin, const tlsphi_state_lanes *x, tlsph_real *dt) {
     const tlsph_real *tau = s->tau + begin;
-    tlsph_real dt[TLSPHI_LANES];
-    if (s->step_rule != TLSPH_STEP_BY_PARTICLE) return;
-    for (size_t l = 0; l < TLSPHI_LANES; l++) dt[l] = tau[l] / tlsphi_max(x->c_p[l], TLSPHI_TINY);
-    for (size_t l = 0; s->beside && l < TLSPHI_LANES; l++) dt[l] *= s->beside[2 * (begin + l)];
-    block->time_step = tlsphi_dmin(block->time_step, (double)s->cfl * (double)tlsphi_least_lane(dt));
+    tlsph_real own[TLSPHI_LANES];
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) own[l] = tau[l] / tlsphi_max(x->c_p[l], TLSPHI_TINY);
+    for (size_t l = 0; s->beside && l < TLSPHI_LANES; l++) own[l] *= s->beside[2 * (begin + l)];
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) dt[l] = tlsphi_min(dt[l], own[l]);
 }
 /* The diffusive limit; before P and H are corrected. h is taken first, because with a choice of pointers gcc makes no
    vectors. */
@@ -4449,50 +4540,76 @@ TLSPHI_INLINE void tlsphi_tile_heat_step(tlsph_solver *s, tlsphi_block *block, s
     block->heat_step = tlsphi_dmin(block->heat_step, heat);
     if (!s->super.most) block->time_step = tlsphi_dmin(block->time_step, heat);
 }
-TLSPHI_INLINE int tlsphi_evaluate_tile(tlsph_solver *s, tlsphi_block *block, size_t begin, const int dim) {
-    const size_t D = (size_t)dim, dd = D * D;
-    const tlsphi_material *m = tlsphi_material_of(s, begin);
-    const tlsph_real per_rho = 1 / m->rho;
-    tlsph_real *row = tlsphi_at(s, 0, begin), good = 1;
-    tlsphi_state_lanes x;
-    tlsphi_prefetch_rows(row, s->rows.P, s->rows.slope_w); /* to be written */
-    tlsphi_prefetch_rows(row, s->rows.wave, s->rows.S);
-    tlsphi_transpose(s->now.p + D * begin, D, x.v);
-    for (size_t i = 0; i < D * TLSPHI_LANES; i++) x.v[i] *= per_rho;
-    x.F = s->now.F + dd * begin;
-    x.H = s->has_H ? s->now.H + dd * begin : NULL;
-    if (s->has_J) memcpy(x.J, s->now.J + begin, TLSPHI_LANES * sizeof *x.J);
-    for (size_t l = 0; l < TLSPHI_LANES; l++) x.E[l] = s->thermal ? s->now.E[begin + l] : 0;
-    tlsphi_constitute_tile(s, m, &x, row);
-    for (size_t l = 0; l < TLSPHI_LANES; l++) good *= x.good[l];
-    if (good < 1) return 0;
-    tlsphi_tile_step(s, block, begin, &x);
-    if (s->conducts) tlsphi_tile_heat_step(s, block, begin, m, &x, dim);
-    for (size_t i = 0; i < D; i++) {
-        memcpy(row + ((size_t)s->rows.v + i) * TLSPHI_ROW, x.v + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *x.v);
-        if (!s->projection)
-            memcpy(row + ((size_t)s->rows.w + i) * TLSPHI_ROW, x.v + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *x.v);
+/* Writes what neighbours read, and lowers dt and the limits of heat; or returns 0 if a state is impossible. */
+TLSPHI_INLINE int tlsphi_publish_tile(tlsph_solver *s, tlsphi_block *block, const tlsphi_material *m, size_t begin,
+                                      const int dim, const tlsphi_state_lanes *x, tlsph_real *dt) {
+    const tlsphi_rows *r = &s->rows;
+    if (tlsphi_least_lane(x->good) < 1) return 0;
+    tlsphi_put_lanes(dim, x->v, tlsphi_at(s, r->v, begin));
+    if (!s->projection) tlsphi_put_lanes(dim, x->v, tlsphi_at(s, r->w, begin));
+    if (s->has_J) tlsphi_put_lanes(1, x->ratio, tlsphi_at(s, r->wave + 3, begin));
+    if (s->has_J) tlsphi_put_lanes(1, x->Sigma_J, tlsphi_at(s, r->S, begin));
+    if (s->thermal) tlsphi_put_lanes(1, x->theta, tlsphi_theta(s, begin));
+    if (s->conducts) {
+        tlsph_real *h_J = tlsphi_at(s, r->h_J, begin);
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) h_J[l] = m->h / x->J[l];
+        tlsphi_tile_heat_step(s, block, begin, m, x, dim);
     }
     if (s->M) {
-        tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), row + (size_t)s->rows.PM * TLSPHI_ROW, dim);
-        tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), row + (size_t)s->rows.A * TLSPHI_ROW, dim);
+        tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), tlsphi_at(s, r->PM, begin), dim);
+        tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), tlsphi_at(s, r->A, begin), dim);
     }
+    tlsphi_tile_step(s, begin, x, dt);
     return 1;
 }
-static int tlsphi_evaluate_lanes(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t end) {
-    if (!tlsphi_takes_lanes(s, begin, end)) return 0;
-    return s->dim == 3 ? tlsphi_evaluate_tile(s, block, begin, 3) : tlsphi_evaluate_tile(s, block, begin, 2);
+/* The particles [begin, end), one by one. */
+static int tlsphi_evaluate_particles(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t end) {
+    tlsph_response user[TLSPHI_LANES];
+    if (s->has_user) tlsphi_user_responses(s, begin, end, user);
+    for (size_t a = begin; a < end; a++)
+        if (!tlsphi_evaluate_particle(s, block, a, user + (a - begin))) return 0;
+    return 1;
+}
+/* How many tiles from `begin` on go by lanes together. */
+static size_t tlsphi_count_tiles(const tlsph_solver *s, const tlsphi_block *block, size_t begin) {
+    const tlsphi_material *m = tlsphi_material_of(s, begin);
+    const size_t whole = begin % TLSPHI_LANES ? 0 : (block->end - begin) / TLSPHI_LANES;
+    const size_t most = whole < TLSPHI_RUN ? whole : TLSPHI_RUN;
+    if (s->audit || s->incompressible || s->least_stretch || s->metal || s->coupling == TLSPH_JOINT_AS_PRINTED ||
+        !tlsphi_has_invariants(m->kind) || m->q != 1 || (s->has_H && m->mooney))
+        return 0;
+    for (size_t i = 0; (s->material_of || s->mirror_of) && i < most * TLSPHI_LANES; i++)
+        if (tlsphi_material_of(s, begin + i) != m || tlsphi_mirrors_of(s, begin + i)) return i / TLSPHI_LANES;
+    return most;
+}
+TLSPHI_INLINE int tlsphi_evaluate_tiles(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t tiles,
+                                        const int dim) {
+    const tlsphi_material *m = tlsphi_material_of(s, begin);
+    tlsphi_state_lanes x[TLSPHI_RUN];
+    tlsph_real dt[TLSPHI_LANES];
+    for (size_t l = 0; l < TLSPHI_LANES; l++) dt[l] = 1 / TLSPHI_TINY;
+    for (size_t i = 0; i < tiles; i++) tlsphi_load_tile(s, m, begin + i * TLSPHI_LANES, dim, x + i);
+    tlsphi_constitute_tiles(s, m, begin, tiles, x);
+    for (size_t i = 0; i < tiles; i++) {
+        const size_t a = begin + i * TLSPHI_LANES;
+        if (!tlsphi_publish_tile(s, block, m, a, dim, x + i, dt) &&
+            !tlsphi_evaluate_particles(s, block, a, a + TLSPHI_LANES)) /* finds the particle */
+            return 0;
+    }
+    if (s->step_rule == TLSPH_STEP_BY_PARTICLE)
+        block->time_step = tlsphi_dmin(block->time_step, (double)s->cfl * (double)tlsphi_least_lane(dt));
+    return 1;
 }
 static void tlsphi_evaluate_block(tlsph_solver *s, tlsphi_block *block) {
-    tlsph_response user[TLSPHI_LANES];
+    int good = 1;
     block->failed = TLSPHI_NONE;
     block->time_step = block->heat_step = TLSPHI_LARGEST;
-    for (size_t begin = block->begin, end; begin < block->end; begin = end) {
-        end = tlsphi_tile_end(block, begin);
-        if (tlsphi_evaluate_lanes(s, block, begin, end)) continue; /* where it fails, the next lines find the particle */
-        if (s->has_user) tlsphi_user_responses(s, begin, end, user);
-        for (size_t a = begin; a < end; a++)
-            if (!tlsphi_evaluate_particle(s, block, a, user + (a - begin))) return;
+    for (size_t begin = block->begin, end; good && begin < block->end; begin = end) {
+        const size_t tiles = tlsphi_count_tiles(s, block, begin);
+        end = tiles ? begin + tiles * TLSPHI_LANES : tlsphi_tile_end(block, begin);
+        if (!tiles) good = tlsphi_evaluate_particles(s, block, begin, end);
+        else if (s->dim == 3) good = tlsphi_evaluate_tiles(s, block, begin, tiles, 3);
+        else good = tlsphi_evaluate_tiles(s, block, begin, tiles, 2);
     }
 }
 static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block); /* [PAIR-STEP] */
