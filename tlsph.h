@@ -3333,13 +3333,13 @@ TLSPHI_INLINE void tlsphi_respond_tensors(const tlsphi_material *m, const tlsphi
                                           const tlsph_real *H, tlsph_response *out) {
     const tlsph_real per_theta = 1 / m->theta_R;
     tlsph_real S[9];
-    for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
+    TLSPHI_UNROLL for (int i = 0; i < 9; i++) S[i] = dev->a * F[i] + dev->c * H[i];
     if (m->mooney) {
         tlsph_real HxF[9];
         tlsphi_cross_inline(H, F, HxF);
-        for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
+        TLSPHI_UNROLL for (int i = 0; i < 9; i++) S[i] += dev->b * HxF[i];
     }
-    for (int i = 0; i < 9; i++) {
+    TLSPHI_UNROLL for (int i = 0; i < 9; i++) {
         out->e_F[i] = m->entropic ? 0 : S[i];
         out->eta_F[i] = m->entropic ? -S[i] * per_theta : 0;
     }
