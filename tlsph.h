@@ -917,17 +917,21 @@ TLSPH_API void tlsph_nodal_weight(int dimension, const tlsph_real low[3], const 
 #else
 #define TLSPHI_UNROLL
 #endif
-/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. clang would
-   unroll short ones before it looks for vectors, and then find few; and it complains where it is told not to optimise
-   and so does not make vectors of them. */
+/* Before a loop over lanes: its rounds do not depend on each other, whatever the pointers may look like. Compilers
+   would unroll short ones before they look for vectors, and then find few; and clang complains where it is told not to
+   optimise and so does not make vectors of them. LANE_BY_LANE: before a loop that collects lanes from anywhere, which
+   gcc does by single loads if it is unrolled; those take less time than the instruction that there is for it. */
 #if defined(__clang__)
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #define TLSPHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
+#define TLSPHI_LANE_BY_LANE
 #elif defined(__GNUC__) && __GNUC__ >= 8
 #define TLSPHI_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#define TLSPHI_LANE_BY_LANE _Pragma("GCC unroll 16")
 #else
 #define TLSPHI_EACH_LANE
+#define TLSPHI_LANE_BY_LANE
 #endif
 
 /* Lanes on the stack begin where cache lines do: gcc sees to it wherever it makes vectors, clang only where it is
@@ -4969,15 +4973,12 @@ TLSPHI_INLINE const tlsph_real *tlsphi_gather_each(const tlsph_solver *s, const 
                                                    int end, int step) {
     if (!slot->scattered) return tlsphi_at(s, 0, slot->from);
     tlsph_real *spare = s->row + (size_t)(block - s->block) * (size_t)s->rows.count * TLSPHI_ROW + TLSPHI_BLOCK;
-    size_t at[TLSPHI_LANES];
-    for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        const size_t b = graph->gathered[slot->from + l];
-        at[l] = b / TLSPHI_BLOCK * (size_t)s->rows.count * TLSPHI_ROW + b % TLSPHI_BLOCK;
-    }
+    const tlsph_real *at[TLSPHI_LANES];
+    TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+        at[l] = tlsphi_at(s, 0, graph->gathered[slot->from + l]);
     for (size_t r = (size_t)first; r < (size_t)end; r += (size_t)step) {
-        const tlsph_real *row = s->row + r * TLSPHI_ROW;
         tlsph_real *out = spare + r * TLSPHI_ROW;
-        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = row[at[l]];
+        TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = at[l][r * TLSPHI_ROW];
     }
     return spare;
 }
@@ -4993,29 +4994,99 @@ TLSPHI_INLINE const tlsph_real *tlsphi_gather_column(const tlsph_solver *s, cons
     tlsphi_gather_each(s, block, graph, slot, r->P + axis, r->wave, dim);
     return tlsphi_gather_each(s, block, graph, slot, r->wave, end, 1);
 }
-/* G_ri += (f_b - f_a)_r g_i for consecutive rows r and the components i that g has, see tlsphi_columns. */
-TLSPHI_INLINE void tlsphi_gradient_columns(const tlsph_real *a, const tlsph_real *b, const tlsph_real *g, const int dim,
-                                           const int width, const size_t *columns, const int rows, tlsph_real *G) {
-    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        tlsph_real C[3];
-        tlsphi_take_components(width, columns, g + l, TLSPHI_LANES, C);
-        TLSPHI_UNROLL for (int r = 0; r < rows; r++) {
-            const tlsph_real jump = b[(size_t)r * TLSPHI_ROW + l] - a[(size_t)r * TLSPHI_ROW + l];
-            TLSPHI_UNROLL for (int i = 0; i < width; i++)
-                G[((size_t)(r * dim) + columns[i]) * TLSPHI_LANES + l] += jump * C[i];
-        }
-    }
+/* The rows [first, end) of the tile itself, close together: that saves an address a row, which a compiler would keep and
+   load again for every pair. */
+TLSPHI_INLINE void tlsphi_take_tile(const tlsph_real *row, int first, int end, tlsph_real *out) {
+    for (size_t i = (size_t)first; i < (size_t)end; i++)
+        memcpy(out + i * TLSPHI_LANES, row + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *out);
 }
-TLSPHI_INLINE void tlsphi_gradient_rows(const tlsph_real *a, const tlsph_real *b, const tlsph_real *g, const int dim,
-                                        int axes, const int rows, tlsph_real *G) {
-    if (tlsphi_widths[axes] == 1) tlsphi_gradient_columns(a, b, g, dim, 1, tlsphi_columns[axes], rows, G);
-    else tlsphi_gradient_columns(a, b, g, dim, dim, tlsphi_columns[7], rows, G);
-}
-
 /* Sums of a tile start from 0; in this form, because for memset compilers call what takes longer than the stores. */
 TLSPHI_INLINE void tlsphi_clear_lanes(const int rows, tlsph_real *lanes) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (int i = 0; i < rows; i++) lanes[(size_t)i * TLSPHI_LANES + l] = 0;
+}
+/* Sums of (f_b - f_a) (x) g over the pairs of a tile, for `rows` rows f that lie side by side and, `with_more`, for one
+   elsewhere. First what a slot adds, for the components i that g has, see tlsphi_columns. */
+TLSPHI_INLINE void tlsphi_add_jumps(const tlsph_real *a, const tlsph_real *b, const size_t apart, const tlsph_real *g,
+                                    const int dim, const int width, const size_t *columns, const int rows,
+                                    tlsph_real *sum) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        TLSPHI_UNROLL for (size_t r = 0; r < (size_t)rows; r++) {
+            const tlsph_real jump = b[r * apart + l] - a[r * TLSPHI_LANES + l];
+            TLSPHI_UNROLL for (size_t j = 0; j < (size_t)width; j++)
+                sum[(r * (size_t)dim + columns[j]) * TLSPHI_LANES + l] += jump * g[columns[j] * TLSPHI_LANES + l];
+        }
+    }
+}
+TLSPHI_INLINE void tlsphi_collect_rows(const tlsph_real *const *at, size_t first, const int rows, tlsph_real *out) {
+    TLSPHI_UNROLL for (size_t r = 0; r < (size_t)rows; r++)
+        TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+            out[r * TLSPHI_LANES + l] = at[l][first + r * TLSPHI_ROW];
+}
+/* Scattered slots have a loop of their own, because in the other gcc then keeps the sums in registers. */
+TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t base, int row, const int rows, int more,
+                                    const int with_more, const int dim, tlsph_real *out, tlsph_real *out_more) {
+    const tlsphi_graph *graph = &s->graph;
+    const tlsphi_slot *slot = graph->slot + graph->first[tile], *end = graph->slot + graph->first[tile + 1];
+    const size_t D = (size_t)dim, beside = (size_t)(more - row) * TLSPHI_ROW, *const all = tlsphi_columns[7];
+    TLSPHI_ALIGNED tlsph_real sum[9 * TLSPHI_LANES], sum_more[3 * TLSPHI_LANES];
+    TLSPHI_ALIGNED tlsph_real a[3 * TLSPHI_LANES], a_more[TLSPHI_LANES], b[3 * TLSPHI_LANES], b_more[TLSPHI_LANES];
+    tlsphi_clear_lanes(rows * dim, sum);
+    tlsphi_clear_lanes(dim, sum_more);
+    tlsphi_take_tile(tlsphi_at(s, row, base), 0, rows, a);
+    if (with_more) tlsphi_take_tile(tlsphi_at(s, more, base), 0, 1, a_more);
+    while (slot < end) {
+        for (; slot < end && slot->scattered; slot++) {
+            const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+            const tlsph_real *at[TLSPHI_LANES];
+            TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+                at[l] = tlsphi_at(s, row, graph->gathered[slot->from + l]);
+            tlsphi_collect_rows(at, 0, rows, b);
+            tlsphi_add_jumps(a, b, TLSPHI_LANES, g, dim, dim, all, rows, sum);
+            if (with_more) tlsphi_collect_rows(at, beside, 1, b_more);
+            if (with_more) tlsphi_add_jumps(a_more, b_more, TLSPHI_LANES, g, dim, dim, all, 1, sum_more);
+        }
+        for (; slot < end && !slot->scattered; slot++) {
+            const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+            const tlsph_real *near = tlsphi_at(s, row, slot->from);
+#define TLSPHI_ADD_JUMPS(width, columns)                                                                               \
+    do {                                                                                                               \
+        tlsphi_add_jumps(a, near, TLSPHI_ROW, g, dim, width, columns, rows, sum);                                      \
+        if (with_more) tlsphi_add_jumps(a_more, near + beside, TLSPHI_ROW, g, dim, width, columns, 1, sum_more);       \
+    } while (0)
+            if (slot->axes == 1) TLSPHI_ADD_JUMPS(1, tlsphi_columns[1]);
+            else if (slot->axes == 2) TLSPHI_ADD_JUMPS(1, tlsphi_columns[2]);
+            else if (dim == 3 && slot->axes == 4) TLSPHI_ADD_JUMPS(1, tlsphi_columns[4]);
+            else TLSPHI_ADD_JUMPS(dim, all);
+        }
+    }
+    for (size_t i = 0; i < (size_t)rows * D * TLSPHI_LANES; i++) out[i] = sum[i];
+    for (size_t i = 0; with_more && i < D * TLSPHI_LANES; i++) out_more[i] = sum_more[i];
+}
+#define TLSPHI_SUM_JUMPS(dim, rows, with_more)                                                                         \
+    TLSPHI_APART void tlsphi_sum_jumps_##dim##rows##with_more(const tlsph_solver *s, size_t tile, size_t base,         \
+                                                              int row, int more, tlsph_real *out,                      \
+                                                              tlsph_real *out_more) {                                  \
+        tlsphi_sum_jumps(s, tile, base, row, rows, more, with_more, dim, out, out_more);                               \
+    }
+TLSPHI_SUM_JUMPS(2, 1, 0)
+TLSPHI_SUM_JUMPS(2, 2, 0)
+TLSPHI_SUM_JUMPS(2, 2, 1)
+TLSPHI_SUM_JUMPS(3, 1, 0)
+TLSPHI_SUM_JUMPS(3, 3, 0)
+TLSPHI_SUM_JUMPS(3, 3, 1)
+/* Of a vector and, unless out_more is NULL, of one number more; of a number. */
+TLSPHI_INLINE void tlsphi_sum_vector(const tlsph_solver *s, size_t tile, size_t base, int row, int more, const int dim,
+                                     tlsph_real *out, tlsph_real *out_more) {
+    if (dim == 3 && out_more) tlsphi_sum_jumps_331(s, tile, base, row, more, out, out_more);
+    else if (dim == 3) tlsphi_sum_jumps_330(s, tile, base, row, row, out, NULL);
+    else if (out_more) tlsphi_sum_jumps_221(s, tile, base, row, more, out, out_more);
+    else tlsphi_sum_jumps_220(s, tile, base, row, row, out, NULL);
+}
+TLSPHI_INLINE void tlsphi_sum_number(const tlsph_solver *s, size_t tile, size_t base, int row, const int dim,
+                                     tlsph_real *out) {
+    if (dim == 3) tlsphi_sum_jumps_310(s, tile, base, row, row, out, NULL);
+    else tlsphi_sum_jumps_210(s, tile, base, row, row, out, NULL);
 }
 /* Raw sums of a tile: v and w, Sigma_J, theta; by rows of lanes. */
 typedef struct TLSPHI_ALIGNED tlsphi_slopes {
@@ -5167,28 +5238,12 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
 }
 TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin,
                                         size_t end, const int dim, int with_w, int with_S, int with_theta) {
-    const tlsphi_graph *graph = &s->graph;
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
-    const tlsph_real *a = tlsphi_at(s, 0, base);
-    const size_t S = (size_t)s->rows.S * TLSPHI_ROW, theta = (size_t)s->rows.theta * TLSPHI_ROW;
+    const tlsphi_rows *r = &s->rows;
     tlsphi_slopes sum;
-    tlsphi_clear_lanes(dim * dim, sum.v);
-    if (with_w) tlsphi_clear_lanes(dim * dim, sum.w);
-    if (with_S) tlsphi_clear_lanes(dim, sum.S);
-    if (with_theta) tlsphi_clear_lanes(dim, sum.theta);
-    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
-        const tlsphi_slot *slot = graph->slot + k;
-        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
-        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, 0, with_w ? 2 * dim : dim);
-        if (slot->scattered && with_S) tlsphi_gather(s, block, graph, slot, s->rows.S, s->rows.S + 1);
-        if (slot->scattered && with_theta) tlsphi_gather(s, block, graph, slot, s->rows.theta, s->rows.theta + 1);
-        tlsphi_gradient_rows(a, b, g, dim, slot->axes, dim, sum.v);
-        if (with_w)
-            tlsphi_gradient_rows(a + (size_t)dim * TLSPHI_ROW, b + (size_t)dim * TLSPHI_ROW, g, dim,
-                                 slot->axes, dim, sum.w);
-        if (with_S) tlsphi_gradient_rows(a + S, b + S, g, dim, slot->axes, 1, sum.S);
-        if (with_theta) tlsphi_gradient_rows(a + theta, b + theta, g, dim, slot->axes, 1, sum.theta);
-    }
+    tlsphi_sum_vector(s, tile, base, r->v, r->S, dim, sum.v, with_S ? sum.S : NULL);
+    if (with_w) tlsphi_sum_vector(s, tile, base, r->w, r->theta, dim, sum.w, with_theta ? sum.theta : NULL);
+    else if (with_theta) tlsphi_sum_number(s, tile, base, r->theta, dim, sum.theta);
     tlsphi_store_slopes(s, block, begin, end, dim, with_w, with_S, with_theta, &sum);
 }
 
@@ -5816,12 +5871,6 @@ TLSPHI_INLINE void tlsphi_clear_damping(tlsphi_lane_sums *sum) {
     tlsphi_clear_lanes(1, sum->approach);
 }
 
-/* The rows [first, end) of the tile itself, close together: that saves an address a row, which a compiler would keep and
-   load again for every pair. */
-TLSPHI_INLINE void tlsphi_take_tile(const tlsph_real *row, int first, int end, tlsph_real *out) {
-    for (size_t i = (size_t)first; i < (size_t)end; i++)
-        memcpy(out + i * TLSPHI_LANES, row + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *out);
-}
 TLSPHI_INLINE void tlsphi_stress_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
                                        const tlsph_real *pattern, const int dim, const int width,
                                        const size_t *columns, tlsphi_lane_sums *sum) {
@@ -7345,19 +7394,11 @@ static double tlsphi_heat_step(const tlsph_solver *s) {
     return dt;
 }
 
-TLSPHI_INLINE void tlsphi_theta_gradient_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile,
-                                              size_t begin, size_t end, const int dim) {
+TLSPHI_INLINE void tlsphi_theta_gradient_tile(const tlsph_solver *s, size_t tile, size_t begin, size_t end,
+                                              const int dim) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
-    const tlsph_real *a = tlsphi_theta(s, base);
-    const int theta = s->rows.theta;
     tlsph_real sum[3 * TLSPHI_LANES], scale[TLSPHI_LANES] = {0};
-    tlsphi_clear_lanes(dim, sum);
-    for (size_t k = s->graph.first[tile]; k < s->graph.first[tile + 1]; k++) {
-        const tlsphi_slot *slot = s->graph.slot + k;
-        const tlsph_real *g = s->graph.pattern + (size_t)slot->pattern * (size_t)s->graph.width * TLSPHI_LANES;
-        const tlsph_real *b = tlsphi_gather(s, block, &s->graph, slot, theta, theta + 1);
-        tlsphi_gradient_rows(a, b + theta * TLSPHI_ROW, g, dim, slot->axes, 1, sum);
-    }
+    tlsphi_sum_number(s, tile, base, s->rows.theta, dim, sum);
     for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
     tlsphi_store_theta(s, base, first, last, dim, scale, s->M ? tlsphi_correction_lanes(s, base) : NULL, sum);
 }
@@ -7377,8 +7418,8 @@ static void tlsphi_theta_gradient_block(tlsph_solver *s, tlsphi_block *block) {
     const int one_by_one = s->audit || s->bonds;
     for (size_t a = block->begin, tile = block->tile, end; a < block->end && !one_by_one; a = end, tile++) {
         end = tlsphi_tile_end(block, a);
-        if (s->dim == 3) tlsphi_theta_gradient_tile(s, block, tile, a, end, 3);
-        else tlsphi_theta_gradient_tile(s, block, tile, a, end, 2);
+        if (s->dim == 3) tlsphi_theta_gradient_tile(s, tile, a, end, 3);
+        else tlsphi_theta_gradient_tile(s, tile, a, end, 2);
     }
     for (size_t a = block->begin; (s->mirrors || one_by_one) && a < block->end; a++) {
         if (one_by_one) tlsphi_theta_gradient(s, a);
