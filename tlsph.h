@@ -5000,10 +5000,15 @@ TLSPHI_INLINE void tlsphi_take_tile(const tlsph_real *row, int first, int end, t
     for (size_t i = (size_t)first; i < (size_t)end; i++)
         memcpy(out + i * TLSPHI_LANES, row + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *out);
 }
-/* Sums of a tile start from 0; in this form, because for memset compilers call what takes longer than the stores. */
+/* Sums of a tile start from 0, and are handed on; in these forms, because for long memset and memcpy compilers call what
+   takes longer than the stores. */
 TLSPHI_INLINE void tlsphi_clear_lanes(const int rows, tlsph_real *lanes) {
-    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+    TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (int i = 0; i < rows; i++) lanes[(size_t)i * TLSPHI_LANES + l] = 0;
+}
+TLSPHI_INLINE void tlsphi_copy_lanes(const int rows, const tlsph_real *from, tlsph_real *to) {
+    TLSPHI_UNROLL for (size_t i = 0; i < (size_t)rows; i++)
+        memcpy(to + i * TLSPHI_LANES, from + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *to);
 }
 /* Sums of (f_b - f_a) (x) g over the pairs of a tile, for `rows` rows f that lie side by side and, `with_more`, for one
    elsewhere. First what a slot adds, for the components i that g has, see tlsphi_columns. */
@@ -5060,8 +5065,8 @@ TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t b
             else TLSPHI_ADD_JUMPS(dim, all);
         }
     }
-    for (size_t i = 0; i < (size_t)rows * D * TLSPHI_LANES; i++) out[i] = sum[i];
-    for (size_t i = 0; with_more && i < D * TLSPHI_LANES; i++) out_more[i] = sum_more[i];
+    tlsphi_copy_lanes(rows * dim, sum, out);
+    if (with_more) tlsphi_copy_lanes(dim, sum_more, out_more);
 }
 #define TLSPHI_SUM_JUMPS(dim, rows, with_more)                                                                         \
     TLSPHI_APART void tlsphi_sum_jumps_##dim##rows##with_more(const tlsph_solver *s, size_t tile, size_t base,         \
@@ -5108,12 +5113,23 @@ TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, si
                                      tlsph_real *row) {
     tlsphi_store_lanes(rows, lanes, first, end, TLSPHI_ROW, row);
 }
+/* 1/(2 V), of all lanes or, in a tile at the end of a block, 0 for those of others. */
+TLSPHI_INLINE void tlsphi_half_per_volume(const tlsph_solver *s, size_t base, size_t first, size_t end,
+                                          tlsph_real *out) {
+    if (end - first == TLSPHI_LANES) {
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = 1 / (2 * s->V[base + l]);
+        return;
+    }
+    for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = l < first || l >= end ? 0 : 1 / (2 * s->V[base + l]);
+}
 /* G = scale G M^T for `rows` gradients a lane; M is NULL, or that of the tile's particles as lanes. */
 TLSPHI_INLINE void tlsphi_finish_gradients(const tlsph_real *scale, const tlsph_real *M, const int dim, const int rows,
                                            tlsph_real *G) {
-    for (size_t i = 0; !M && i < (size_t)(rows * dim); i++)
-        for (size_t l = 0; l < TLSPHI_LANES; l++) G[i * TLSPHI_LANES + l] *= scale[l];
-    if (!M) return;
+    if (!M) {
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+            TLSPHI_UNROLL for (size_t i = 0; i < (size_t)(rows * dim); i++) G[i * TLSPHI_LANES + l] *= scale[l];
+        return;
+    }
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsph_real A[9], g[3], out[3];
         TLSPHI_UNROLL for (int i = 0; i < dim * dim; i++) A[i] = M[(size_t)i * TLSPHI_LANES + l];
@@ -5127,10 +5143,11 @@ TLSPHI_INLINE void tlsphi_finish_gradients(const tlsph_real *scale, const tlsph_
 /* scale P : G of each lane */
 TLSPHI_INLINE void tlsphi_contract(const int n, const tlsph_real *row, const tlsph_real *G, const tlsph_real *scale,
                                    tlsph_real *out) {
-    for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] = 0;
-    for (size_t i = 0; i < (size_t)n; i++)
-        for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] += row[i * TLSPHI_ROW + l] * G[i * TLSPHI_LANES + l];
-    for (size_t l = 0; l < TLSPHI_LANES; l++) out[l] *= scale[l];
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real sum = 0;
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)n; i++) sum += row[i * TLSPHI_ROW + l] * G[i * TLSPHI_LANES + l];
+        out[l] = sum * scale[l];
+    }
 }
 /* The particles first to last of a tile: n components of each become lanes. */
 TLSPHI_INLINE void tlsphi_take_lanes(const tlsph_real *from, const size_t n, size_t first, size_t last,
@@ -5214,16 +5231,16 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
     const int dd = dim * dim;
     const tlsph_real *M = s->M ? tlsphi_correction_lanes(s, base) : NULL;
-    tlsph_real *row = tlsphi_at(s, 0, base), scale[TLSPHI_LANES] = {0}, rate[TLSPHI_LANES];
-    for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
+    tlsph_real *row = tlsphi_at(s, 0, base), scale[TLSPHI_LANES], rate[TLSPHI_LANES];
+    tlsphi_half_per_volume(s, base, first, last, scale);
     tlsph_real *const w = with_w ? sum->w : sum->v;
     if (s->rate_E) {
         tlsphi_contract(dd, row + (size_t)s->rows.PM * TLSPHI_ROW, w, scale, rate);
-        for (size_t l = first; l < last; l++) s->rate_E[base + l] = rate[l];
+        tlsphi_store_lanes(1, rate, first, last, 0, s->rate_E + base);
     }
     if (s->rate_J) {
         tlsphi_contract(dd, row + (size_t)s->rows.A * TLSPHI_ROW, sum->v, scale, rate);
-        for (size_t l = first; l < last; l++) s->rate_J[base + l] = rate[l];
+        tlsphi_store_lanes(1, rate, first, last, 0, s->rate_J + base);
     }
     tlsphi_finish_gradients(scale, M, dim, dim, sum->v);
     if (with_w) tlsphi_finish_gradients(scale, M, dim, dim, sum->w);
@@ -7397,9 +7414,9 @@ static double tlsphi_heat_step(const tlsph_solver *s) {
 TLSPHI_INLINE void tlsphi_theta_gradient_tile(const tlsph_solver *s, size_t tile, size_t begin, size_t end,
                                               const int dim) {
     const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES, first = begin - base, last = end - base;
-    tlsph_real sum[3 * TLSPHI_LANES], scale[TLSPHI_LANES] = {0};
+    tlsph_real sum[3 * TLSPHI_LANES], scale[TLSPHI_LANES];
     tlsphi_sum_number(s, tile, base, s->rows.theta, dim, sum);
-    for (size_t l = first; l < last; l++) scale[l] = 1 / (2 * s->V[base + l]);
+    tlsphi_half_per_volume(s, base, first, last, scale);
     tlsphi_store_theta(s, base, first, last, dim, scale, s->M ? tlsphi_correction_lanes(s, base) : NULL, sum);
 }
 /* One by one: with bonds, at mirrors, and to compare (`audit`). */
