@@ -5000,8 +5000,8 @@ TLSPHI_INLINE void tlsphi_take_tile(const tlsph_real *row, int first, int end, t
     for (size_t i = (size_t)first; i < (size_t)end; i++)
         memcpy(out + i * TLSPHI_LANES, row + i * TLSPHI_ROW, TLSPHI_LANES * sizeof *out);
 }
-/* Sums of a tile start from 0, and are handed on; in these forms, because for long memset and memcpy compilers call what
-   takes longer than the stores. */
+/* Sums of a tile start from 0, and are handed on; in these forms, because for memset and memcpy of many rows compilers
+   call what takes longer than the stores. */
 TLSPHI_INLINE void tlsphi_clear_lanes(const int rows, tlsph_real *lanes) {
     TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
         TLSPHI_UNROLL for (int i = 0; i < rows; i++) lanes[(size_t)i * TLSPHI_LANES + l] = 0;
@@ -5033,7 +5033,7 @@ TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t b
                                     const int with_more, const int dim, tlsph_real *out, tlsph_real *out_more) {
     const tlsphi_graph *graph = &s->graph;
     const tlsphi_slot *slot = graph->slot + graph->first[tile], *end = graph->slot + graph->first[tile + 1];
-    const size_t D = (size_t)dim, beside = (size_t)(more - row) * TLSPHI_ROW, *const all = tlsphi_columns[7];
+    const size_t beside = (size_t)(more - row) * TLSPHI_ROW, *const all = tlsphi_columns[7];
     TLSPHI_ALIGNED tlsph_real sum[9 * TLSPHI_LANES], sum_more[3 * TLSPHI_LANES];
     TLSPHI_ALIGNED tlsph_real a[3 * TLSPHI_LANES], a_more[TLSPHI_LANES], b[3 * TLSPHI_LANES], b_more[TLSPHI_LANES];
     tlsphi_clear_lanes(rows * dim, sum);
