@@ -4544,6 +4544,16 @@ TLSPHI_INLINE void tlsphi_tile_heat_step(tlsph_solver *s, tlsphi_block *block, s
     block->heat_step = tlsphi_dmin(block->heat_step, heat);
     if (!s->super.most) block->time_step = tlsphi_dmin(block->time_step, heat);
 }
+/* P of the particles in mirrors. */
+TLSPHI_INLINE void tlsphi_mirror_tile(const tlsph_solver *s, size_t begin, const int dim) {
+    for (size_t a = begin; a < begin + TLSPHI_LANES; a++)
+        for (const tlsphi_mirror *mirror = tlsphi_mirrors_of(s, a); mirror && mirror->particle == a; mirror++) {
+            tlsph_real P[9];
+            tlsphi_row_get(s, s->rows.PM, dim * dim, a, P);
+            tlsphi_mirror_tensor(dim, mirror, P);
+            tlsphi_row_put(s, s->rows.PM, dim * dim, a, P);
+        }
+}
 /* Writes what neighbours read, and lowers dt and the limits of heat; or returns 0 if a state is impossible. */
 TLSPHI_INLINE int tlsphi_publish_tile(tlsph_solver *s, tlsphi_block *block, const tlsphi_material *m, size_t begin,
                                       const int dim, const tlsphi_state_lanes *x, tlsph_real *dt) {
@@ -4559,6 +4569,7 @@ TLSPHI_INLINE int tlsphi_publish_tile(tlsph_solver *s, tlsphi_block *block, cons
         TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) h_J[l] = m->h / x->J[l];
         tlsphi_tile_heat_step(s, block, begin, m, x, dim);
     }
+    if (s->mirror_of) tlsphi_mirror_tile(s, begin, dim);
     if (s->M) {
         tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), tlsphi_at(s, r->PM, begin), dim);
         tlsphi_correct_rows(tlsphi_correction_lanes(s, begin), tlsphi_at(s, r->A, begin), dim);
@@ -4582,8 +4593,8 @@ static size_t tlsphi_count_tiles(const tlsph_solver *s, const tlsphi_block *bloc
     if (s->audit || s->incompressible || s->least_stretch || s->metal || s->coupling == TLSPH_JOINT_AS_PRINTED ||
         !tlsphi_has_invariants(m->kind) || m->q != 1 || (s->has_H && m->mooney))
         return 0;
-    for (size_t i = 0; (s->material_of || s->mirror_of) && i < most * TLSPHI_LANES; i++)
-        if (tlsphi_material_of(s, begin + i) != m || tlsphi_mirrors_of(s, begin + i)) return i / TLSPHI_LANES;
+    for (size_t i = 0; s->material_of && i < most * TLSPHI_LANES; i++)
+        if (tlsphi_material_of(s, begin + i) != m) return i / TLSPHI_LANES;
     return most;
 }
 TLSPHI_INLINE int tlsphi_evaluate_tiles(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t tiles,

@@ -192,7 +192,8 @@ moving_block moving_block_default(void)
 static int moving_block_conditions(const moving_block *s, const tlsph_particles *particles, uint32_t *left, uint32_t *right,
                             tlsph_condition conditions[4])
 {
-    conditions[0] = tlsph_condition_default(TLSPH_CLAMPED);
+    conditions[0] = tlsph_condition_default(s->slides ? TLSPH_ROLLER : TLSPH_CLAMPED);
+    conditions[0].normal[0] = s->slides ? 1 : 0;
     conditions[0].particles = left;
     conditions[0].count = tlsph_select_plane(particles, 0, 0, R(1e-4), left, particles->count);
     if (s->unloaded == 1) return 1;

@@ -91,6 +91,13 @@ TEST(clouds)
     compare_all(body(3, 0.2), 0.5);
     compare_all(body(2, 0.2), 0.5);
 }
+TEST(mirrors)
+{
+    moving_block s = body(3, 0), flat = body(2, 0.2);
+    s.slides = flat.slides = 1;
+    compare_all(s, 0.5);
+    compare_all(flat, 0.5);
+}
 TEST(fronts) /* faster than TLSPH_FRONT_LOW of the p speed between neighbours */
 {
     moving_block s = body(3, 0);
@@ -202,5 +209,5 @@ TEST(temperatures_of_round_off)
     tlsph_cloud_destroy(&cloud);
 }
 
-SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
+SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(mirrors), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
       ENTRY(leapfrog), ENTRY(other_dissipations), ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
