@@ -5106,13 +5106,13 @@ typedef struct TLSPHI_ALIGNED tlsphi_slopes {
 /* Lanes [first, end) to the columns of rows `apart` from each other. */
 TLSPHI_INLINE void tlsphi_store_lanes(const int rows, const tlsph_real *lanes, size_t first, size_t end, size_t apart,
                                       tlsph_real *row) {
-    for (size_t i = 0; i < (size_t)rows; i++) {
-        const tlsph_real *from = lanes + i * TLSPHI_LANES;
-        tlsph_real *to = row + i * apart;
-        if (end - first == TLSPHI_LANES) memcpy(to, from, TLSPHI_LANES * sizeof *to);
-        else
-            for (size_t l = first; l < end; l++) to[l] = from[l];
+    if (end - first == TLSPHI_LANES) {
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)rows; i++)
+            memcpy(row + i * apart, lanes + i * TLSPHI_LANES, TLSPHI_LANES * sizeof *row);
+        return;
     }
+    for (size_t i = 0; i < (size_t)rows; i++)
+        for (size_t l = first; l < end; l++) row[i * apart + l] = lanes[i * TLSPHI_LANES + l];
 }
 TLSPHI_INLINE void tlsphi_store_rows(const int rows, const tlsph_real *lanes, size_t first, size_t end,
                                      tlsph_real *row) {
