@@ -5058,11 +5058,11 @@ TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t b
         }
         for (; slot < end && !slot->scattered; slot++) {
             const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
-            const tlsph_real *near = tlsphi_at(s, row, slot->from);
+            const tlsph_real *there = tlsphi_at(s, row, slot->from);
 #define TLSPHI_ADD_JUMPS(width, columns)                                                                               \
     do {                                                                                                               \
-        tlsphi_add_jumps(a, near, TLSPHI_ROW, g, dim, width, columns, rows, sum);                                      \
-        if (with_more) tlsphi_add_jumps(a_more, near + beside, TLSPHI_ROW, g, dim, width, columns, 1, sum_more);       \
+        tlsphi_add_jumps(a, there, TLSPHI_ROW, g, dim, width, columns, rows, sum);                                     \
+        if (with_more) tlsphi_add_jumps(a_more, there + beside, TLSPHI_ROW, g, dim, width, columns, 1, sum_more);      \
     } while (0)
             if (slot->axes == 1) TLSPHI_ADD_JUMPS(1, tlsphi_columns[1]);
             else if (slot->axes == 2) TLSPHI_ADD_JUMPS(1, tlsphi_columns[2]);
