@@ -149,7 +149,7 @@ static double share_by_lanes(tlsph_solver *s) {
         for (size_t begin = s->block[i].begin, end; begin < s->block[i].end; begin = end) {
             end = tlsphi_tile_end(s->block + i, begin);
             whole += end - begin == TLSPHI_LANES;
-            by_lanes += tlsphi_evaluate_lanes(s, s->block + i, begin, end) != 0;
+            by_lanes += tlsphi_count_tiles(s, s->block + i, begin) > 0;
         }
     return (double)by_lanes / (double)whole;
 }
