@@ -4298,7 +4298,7 @@ typedef struct TLSPHI_ALIGNED tlsphi_state_lanes {
     tlsph_real J23[TLSPHI_LANES], per_J[TLSPHI_LANES];
     tlsph_real energy[TLSPHI_LANES], entropy[TLSPHI_LANES], e_J[TLSPHI_LANES], eta_J[TLSPHI_LANES];
     tlsph_real p_modulus[2 * TLSPHI_LANES], s_modulus[2 * TLSPHI_LANES], drift[TLSPHI_LANES], ratio[TLSPHI_LANES];
-    tlsph_real theta[TLSPHI_LANES], Sigma_J[TLSPHI_LANES], c_p[TLSPHI_LANES], good[TLSPHI_LANES];
+    tlsph_real theta[TLSPHI_LANES], Sigma_J[TLSPHI_LANES], c_p[TLSPHI_LANES], all[TLSPHI_LANES];
 } tlsphi_state_lanes;
 
 /* n components a particle become n lanes. */
@@ -4427,7 +4427,7 @@ static void tlsphi_temperature_lanes(const tlsph_solver *s, const tlsphi_materia
         x->theta[l] = theta_R * tlsphi_exp(heat) + 0 * heat;
     }
 }
-/* Writes P and H to their rows, the wave speeds, and whether all is well. */
+/* Writes P and H to their rows, the wave speeds, and `all`, which is finite only if all of them are. */
 TLSPHI_INLINE void tlsphi_conclude_lanes(const tlsph_solver *s, const tlsphi_material *given, const int dim,
                                          const int has_H, const int entropic, const int mooney, size_t begin,
                                          size_t tiles, tlsphi_state_lanes *x) {
@@ -4455,9 +4455,9 @@ TLSPHI_INLINE void tlsphi_conclude_lanes(const tlsph_solver *s, const tlsphi_mat
             wave[l] = x->c_p[l] = pt.c_p;
             wave[TLSPHI_ROW + l] = pt.c_s;
             x->Sigma_J[l] = pt.Sigma_J;
-            tlsph_real all = x->d[l] + x->J[l] + theta + pt.c_p + x->kinetic[l]; /* finite only if all of them are */
+            tlsph_real all = x->d[l] + x->J[l] + theta + pt.c_p + x->kinetic[l];
             TLSPHI_UNROLL for (int i = 0; i < 9; i++) all += pt.P[i];
-            x->good[l] = (x->d[l] > 0) & (x->J[l] > 0) & (theta > 0) & tlsphi_finite(all) ? TLSPHI_R(1) : TLSPHI_R(0);
+            x->all[l] = all;
         }
     }
 }
@@ -4510,6 +4510,13 @@ static tlsph_real tlsphi_least_lane(const tlsph_real *lanes) {
     for (size_t l = 0; l < TLSPHI_LANES; l++) least = tlsphi_min(least, lanes[l]);
     return least;
 }
+/* Here and not in tlsphi_conclude_lanes: SSE2 compares no integers of 64 bits, and no vectors would be made of that. */
+static int tlsphi_is_possible(const tlsphi_state_lanes *x) {
+    int good = 1;
+    for (size_t l = 0; l < TLSPHI_LANES; l++)
+        good &= (x->d[l] > 0) & (x->J[l] > 0) & (x->theta[l] > 0) & tlsphi_finite(x->all[l]);
+    return good;
+}
 /* Lowers dt to the longest steps of the particles of a tile, but for cfl: as tlsphi_particle_step. */
 static void tlsphi_tile_step(const tlsph_solver *s, size_t begin, const tlsphi_state_lanes *x, tlsph_real *dt) {
     const tlsph_real *tau = s->tau + begin;
@@ -4552,7 +4559,7 @@ TLSPHI_INLINE void tlsphi_mirror_tile(const tlsph_solver *s, size_t begin, const
 TLSPHI_INLINE int tlsphi_publish_tile(tlsph_solver *s, tlsphi_block *block, const tlsphi_material *m, size_t begin,
                                       const int dim, const tlsphi_state_lanes *x, tlsph_real *dt) {
     const tlsphi_rows *r = &s->rows;
-    if (tlsphi_least_lane(x->good) < 1) return 0;
+    if (!tlsphi_is_possible(x)) return 0;
     tlsphi_put_lanes(dim, x->v, tlsphi_at(s, r->v, begin));
     if (!s->projection) tlsphi_put_lanes(dim, x->v, tlsphi_at(s, r->w, begin));
     if (s->has_J) tlsphi_put_lanes(1, x->ratio, tlsphi_at(s, r->wave + 3, begin));

@@ -59,7 +59,7 @@ only=$*
 exact="-ffp-contract=off"
 toolchain gcc gcc "$warnings $exact" -
 toolchain gcc_sse2 gcc "-mno-avx $exact" -
-grep -qs avx2 /proc/cpuinfo && toolchain gcc_avx2 gcc "-O3 -mavx2 -mfma $exact" - # tlsphi_choose by bits
+grep -qs avx2 /proc/cpuinfo && toolchain gcc_avx2 gcc "-O3 -mavx2 -mfma $exact" -
 toolchain clang clang "$warnings $exact" -
 toolchain clang_14 clang-14 "$exact" -
 toolchain clang_16 clang-16 "$exact" -
