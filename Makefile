@@ -120,7 +120,7 @@ SKIPPED = echo "$(1)"; echo "0 passed, 0 failed, 1 skipped"
 HEADER = "CC='$(CC)' sh tests/header.sh$(1)"
 FAST_STEPS := "build/test_double" "build/test_float"
 SANITIZED := $(if $(SANITIZE),sanitized sanitized_float)
-SLOW_STEPS := $(call HEADER, --optimised) "build/test_double --slow" "build/test_fast_math" \
+SLOW_STEPS := $(call HEADER, --optimised) "sh tests/vectors.sh" "build/test_double --slow" "build/test_fast_math" \
   $(if $(THREAD_SANITIZE),"build/test_threads embedding/","$(call SKIPPED,no thread sanitizer)") \
   $(if $(SANITIZE),"build/test_sanitized $(QUICK:%=%/)" "build/test_sanitized_float $(QUICK:%=%/)",\
     "$(call SKIPPED,no sanitizers)") \
