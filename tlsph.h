@@ -3814,7 +3814,7 @@ struct tlsph_solver {
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
     tlsph_real *laplacian, *lean;     /* [JST]: l_ab a pair, 2 vectors a particle */
-    tlsph_real *held; /* frozen dissipation: T, D_J and the share of heat of each particle, D + 2; or see [LEAPFROG] */
+    tlsph_real *held; /* dissipation that outlasts its pass, see tlsphi_keep_damping */
     /* conditions */
     tlsphi_fix *fix;
     tlsphi_mirror *mirror;
@@ -3926,6 +3926,10 @@ TLSPHI_INLINE void tlsphi_tensor_get(const tlsph_real *field, const int dd, size
 TLSPHI_INLINE void tlsphi_tensor_put(tlsph_real *field, const int dd, size_t a, const tlsph_real *in) {
     tlsph_real *at = field + tlsphi_tensor_at((size_t)dd, a);
     TLSPHI_UNROLL for (int i = 0; i < dd; i++) at[(size_t)i * TLSPHI_LANES] = in[i];
+}
+/* Dissipation that outlasts the pass, by tiles: D_p, D_J and the power, see tlsphi_keep_damping. */
+TLSPHI_INLINE tlsph_real *tlsphi_held(const tlsph_solver *s, size_t a) {
+    return s->held + tlsphi_tensor_at((size_t)s->dim + 2, a);
 }
 /* As 3x3, with the third diagonal entry of plane strain. */
 static void tlsphi_tensor_expand(const tlsph_real *field, int dim, size_t a, tlsph_real third, tlsph_real out[9]) {
@@ -6134,32 +6138,29 @@ static void tlsphi_add_gathered(tlsphi_gathered *sum, const tlsphi_gathered *mor
     sum->heat += more->heat;
     sum->production += more->production;
 }
-/* Frozen dissipation (see [STEP]): evaluates and keeps it in the first stage, adds it in all. */
 static tlsph_real tlsphi_sigma(const tlsph_solver *s, size_t a) { return s->has_J ? *tlsphi_at(s, s->rows.S, a) : 0; }
-static void tlsphi_keep_damping(const tlsph_solver *s, size_t a, const tlsphi_gathered *damping) {
-    tlsph_real *held = s->held + (size_t)(s->dim + 2) * a, w[3] = {0, 0, 0};
-    tlsphi_row_get(s, s->rows.w, s->dim, a, w);
-    for (int i = 0; i < s->dim; i++) held[i] = damping->T[i];
-    held[s->dim] = damping->J;
-    held[s->dim + 1] = tlsphi_dot(s->dim, w, damping->T) + damping->heat + damping->production / 2 +
-                       tlsphi_sigma(s, a) * damping->J;
+/* Frozen dissipation (see [STEP]) is evaluated and kept in the first stage, and added in all. The leapfrog keeps it
+   because it does not know the velocity of the whole step yet: T_D, and w.T_D as the power. */
+TLSPHI_INLINE void tlsphi_keep_damping(const int dim, const tlsph_real *w, tlsph_real sigma, const tlsph_real *T,
+                                       tlsph_real D_J, tlsph_real heat, tlsph_real *held) {
+    tlsph_real power = 0;
+    TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) {
+        held[i * TLSPHI_LANES] = T[i];
+        power += w[i] * T[i];
+    }
+    held[(size_t)dim * TLSPHI_LANES] = D_J;
+    held[((size_t)dim + 1) * TLSPHI_LANES] = power + heat + sigma * D_J;
 }
-static void tlsphi_add_damping(const tlsph_solver *s, size_t a, tlsphi_gathered *sum) {
-    const tlsph_real *held = s->held + (size_t)(s->dim + 2) * a;
-    tlsph_real w[3] = {0, 0, 0};
-    tlsphi_row_get(s, s->rows.w, s->dim, a, w);
-    const tlsph_real heat = held[s->dim + 1] - tlsphi_dot(s->dim, w, held); /* share + Sigma_J D_J */
-    for (int i = 0; i < s->dim; i++) sum->T[i] += held[i];
-    sum->J += held[s->dim];
-    sum->production += 2 * (heat - tlsphi_sigma(s, a) * held[s->dim]);
-}
-
-/* The leapfrog's velocity of the whole step is not known yet: keeps T_D and w.T_D. */
-static void tlsphi_hold_damping(const tlsph_solver *s, size_t a, const tlsphi_gathered *sum) {
-    tlsph_real *held = s->held + (size_t)(s->dim + 2) * a, w[3] = {0, 0, 0};
-    tlsphi_row_get(s, s->rows.w, s->dim, a, w);
-    for (int i = 0; i < s->dim; i++) held[i] = sum->damped[i];
-    held[s->dim] = tlsphi_dot(s->dim, w, held);
+/* T += T_D, D_J; returns the production. */
+TLSPHI_INLINE tlsph_real tlsphi_add_damping(const int dim, const tlsph_real *held, const tlsph_real *w,
+                                            tlsph_real sigma, tlsph_real *T, tlsph_real *D_J) {
+    tlsph_real power = 0;
+    TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) {
+        T[i] += held[i * TLSPHI_LANES];
+        power += w[i] * held[i * TLSPHI_LANES];
+    }
+    *D_J = held[(size_t)dim * TLSPHI_LANES];
+    return 2 * (held[((size_t)dim + 1) * TLSPHI_LANES] - power - sigma * *D_J);
 }
 
 /* Relaxation of J towards det F, -r c_p/tau phi, r = min(1, r0 (c_s/c_p)^2 (1 + (ln(J/d)/0.05)^2)): slower the closer nu
@@ -6202,7 +6203,52 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
     s->rate_E[a] = s->thermal == TLSPH_ENERGY ? s->rate_E[a] + rate : rate;
 }
 
-/* The same for a whole tile, isothermal or with E, whose dissipation is not kept. */
+/* The same for a whole tile: the dissipation that is kept; that which is added; rates. */
+TLSPHI_INLINE void tlsphi_keep_lanes(const tlsph_solver *s, size_t base, const int dim,
+                                     const tlsphi_lane_sums *damping) {
+    const tlsph_real none[TLSPHI_LANES] = {0}, whole = s->leaps ? 0 : TLSPHI_R(1);
+    const tlsph_real *w = tlsphi_at(s, s->rows.w, base), *S = s->has_J ? tlsphi_at(s, s->rows.S, base) : none;
+    tlsph_real *held = tlsphi_held(s, base);
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real w_a[3], T[3];
+        tlsphi_take_apart(dim, w + l, TLSPHI_ROW, w_a);
+        tlsphi_take_apart(dim, damping->damped + l, TLSPHI_LANES, T);
+        tlsphi_keep_damping(dim, w_a, S[l], T, whole * damping->J[l], whole * (damping->production[l] / 2), held + l);
+    }
+}
+TLSPHI_INLINE void tlsphi_add_kept_lanes(const tlsph_solver *s, size_t base, const int dim, tlsphi_lane_sums *sum) {
+    const tlsph_real none[TLSPHI_LANES] = {0}, *held = tlsphi_held(s, base);
+    const tlsph_real *w = tlsphi_at(s, s->rows.w, base), *S = s->has_J ? tlsphi_at(s, s->rows.S, base) : none;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        tlsph_real w_a[3], T[3], D_J;
+        tlsphi_take_apart(dim, w + l, TLSPHI_ROW, w_a);
+        tlsphi_take_apart(dim, sum->T + l, TLSPHI_LANES, T);
+        sum->production[l] = tlsphi_add_damping(dim, held + l, w_a, S[l], T, &D_J);
+        sum->J[l] = D_J;
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) sum->T[i * TLSPHI_LANES + l] = T[i];
+    }
+}
+static void tlsphi_add_sums(const tlsphi_lane_sums *damping, tlsphi_lane_sums *sum) {
+    for (size_t i = 0; i < 3 * TLSPHI_LANES; i++) {
+        sum->T[i] += damping->T[i];
+        sum->damped[i] += damping->damped[i];
+    }
+    for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        sum->J[l] += damping->J[l];
+        sum->production[l] += damping->production[l];
+    }
+}
+TLSPHI_INLINE void tlsphi_flux_whole(const tlsph_solver *s, tlsphi_block *block, size_t tile, size_t base,
+                                     const int dim, tlsphi_lane_sums *sum) {
+    tlsphi_lane_sums damping;
+    const int apart = s->parted && (!s->frozen || s->damps);
+    tlsphi_flux_tile(s, block, tile, base, s->parted ? TLSPHI_STRESSES : TLSPHI_BOTH, sum);
+    if (apart) tlsphi_flux_tile(s, block, tile, base, TLSPHI_DAMPING, &damping);
+    if (apart && s->frozen) tlsphi_keep_lanes(s, base, dim, &damping);
+    else if (apart) tlsphi_add_sums(&damping, sum);
+    if (s->frozen) tlsphi_add_kept_lanes(s, base, dim, sum);
+    if (s->leaps) tlsphi_keep_lanes(s, base, dim, sum);
+}
 TLSPHI_INLINE void tlsphi_store_momentum(const tlsph_solver *s, size_t base, const tlsphi_lane_sums *sum,
                                          const tlsph_real *inverse, const size_t D) {
     tlsph_real *rate = s->rate_p + D * base;
@@ -6214,9 +6260,16 @@ static void tlsphi_store_energy(const tlsph_solver *s, size_t base, const tlsphi
     const tlsph_real *theta = tlsphi_theta(s, base), *S = s->has_J ? tlsphi_at(s, s->rows.S, base) : NULL;
     tlsph_real *rate = s->rate_E + base, entropy[TLSPHI_LANES], source[TLSPHI_LANES];
     for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        rate[l] += sum->heat[l] * inverse[l] + (sum->production[l] / 2 + (S ? S[l] * sum->J[l] : 0)) * inverse[l];
         entropy[l] = sum->production[l] / (2 * theta[l]);
         source[l] = s->heat_moves ? sum->source[l] / (2 * theta[l]) : 0;
+    }
+    if (s->thermal == TLSPH_ENERGY) {
+        for (size_t l = 0; l < TLSPHI_LANES; l++)
+            rate[l] += sum->heat[l] * inverse[l] + (sum->production[l] / 2 + (S ? S[l] * sum->J[l] : 0)) * inverse[l];
+    } else {
+        const tlsph_real heats = s->dissipation_heats ? TLSPHI_R(1) : 0;
+        for (size_t l = 0; l < TLSPHI_LANES; l++)
+            rate[l] = (sum->heat[l] + source[l] + heats * entropy[l]) * inverse[l];
     }
     for (size_t l = 0; l < TLSPHI_LANES; l++) {
         block[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)entropy[l];
@@ -6248,11 +6301,16 @@ static void tlsphi_flux_particles(tlsph_solver *s, tlsphi_block *block, size_t t
     }
     for (size_t a = begin; a < end; a++) {
         tlsphi_gathered *sum = &part[0][a - begin], *damping = &part[1][a - begin];
-        if (passes == 2 && s->frozen) tlsphi_keep_damping(s, a, damping);
+        tlsph_real *held = s->held ? tlsphi_held(s, a) : NULL, w[3] = {0, 0, 0}, D_J = 0;
+        const tlsph_real sigma = tlsphi_sigma(s, a);
+        tlsphi_row_get(s, s->rows.w, s->dim, a, w);
+        if (passes == 2 && s->frozen)
+            tlsphi_keep_damping(s->dim, w, sigma, damping->T, damping->J, damping->heat + damping->production / 2, held);
         if (passes == 2 && !s->frozen) tlsphi_add_gathered(sum, damping);
         if (passes == 2) sum->least = tlsphi_dmin(sum->least, damping->least);
-        if (s->frozen) tlsphi_add_damping(s, a, sum);
-        if (s->leaps) tlsphi_hold_damping(s, a, sum);
+        if (s->frozen) sum->production += tlsphi_add_damping(s->dim, held, w, sigma, sum->T, &D_J);
+        if (s->leaps) tlsphi_keep_damping(s->dim, w, 0, sum->damped, 0, 0, held);
+        sum->J += D_J;
         tlsphi_flux_store(s, a, sum, block->sums);
     }
 }
@@ -6264,8 +6322,7 @@ static void tlsphi_warm_fluxes(const tlsph_solver *s, const tlsphi_block *block)
     else tlsphi_warm_rows(s, ahead, r->P, r->A);
 }
 static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
-    const int plain =
-        s->lanes && !s->parted && s->thermal != TLSPH_ENTROPY && !s->leaps && !(s->drift_relaxation > 0);
+    const int plain = s->lanes && !(s->drift_relaxation > 0);
     tlsphi_lane_sums lanes;
     if (tlsphi_outgrows_cache(s)) tlsphi_warm_fluxes(s, block);
     for (int i = 0; i < TLSPHI_SUMS; i++) block->sums[i] = i == TLSPHI_SUM_LEAST ? TLSPHI_LARGEST : 0;
@@ -6275,7 +6332,8 @@ static void tlsphi_flux_block(tlsph_solver *s, tlsphi_block *block) {
             tlsphi_flux_particles(s, block, tile, begin, end);
             continue;
         }
-        tlsphi_flux_tile(s, block, tile, begin, TLSPHI_BOTH, &lanes);
+        if (s->dim == 3) tlsphi_flux_whole(s, block, tile, begin, 3, &lanes);
+        else tlsphi_flux_whole(s, block, tile, begin, 2, &lanes);
         tlsphi_store_tile(s, begin, &lanes, block->sums);
     }
 }
@@ -7989,19 +8047,22 @@ static void tlsphi_mean_velocity_block(tlsph_solver *s, tlsphi_block *block) {
 /* The kinetic part of E, and the heat of the dissipation as far as m differs from v^n. */
 static void tlsphi_mean_work_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
+    double dissipated = 0, entropy = 0;
     for (size_t a = block->begin; a < block->end; a++) {
-        const tlsph_real *held = s->held + (D + 2) * a, *p = s->now.p + D * a, *old = s->old.p + D * a;
-        tlsph_real w[3] = {0, 0, 0};
-        tlsphi_row_get(s, s->rows.w, s->dim, a, w);
-        const tlsph_real heat = held[D] - tlsphi_any_dot(s->dim, w, held);
-        block->sums[TLSPHI_SUM_DISSIPATION] += (double)heat;
+        const tlsph_real *held = tlsphi_held(s, a), *p = s->now.p + D * a, *old = s->old.p + D * a;
+        const tlsph_real *w = tlsphi_at(s, s->rows.w, a);
+        tlsph_real heat = held[(D + 1) * TLSPHI_LANES];
+        for (size_t k = 0; k < D; k++) heat -= w[k * TLSPHI_ROW] * held[k * TLSPHI_LANES];
+        dissipated += (double)heat;
         if (!s->thermal) continue;
         const tlsph_real theta = *tlsphi_theta(s, a), density = heat / s->V[a];
-        block->sums[TLSPHI_SUM_DISSIPATION_ENTROPY] += (double)(heat / theta);
+        entropy += (double)(heat / theta);
         if (s->thermal == TLSPH_ENTROPY) s->rate_E[a] = s->dissipation_heats ? density / theta : 0;
         else s->rate_E[a] += density;
         for (size_t k = 0; s->thermal == TLSPH_ENERGY && k < D; k++) s->now.E[a] += tlsphi_v(s, a, k) * (p[k] - old[k]);
     }
+    block->sums[TLSPHI_SUM_DISSIPATION] += dissipated;
+    block->sums[TLSPHI_SUM_DISSIPATION_ENTROPY] += entropy;
 }
 /* The work of loads has been taken with v^n: the rest of that with m. */
 static void tlsphi_mean_work_of_loads(tlsph_solver *s, double dt) {
@@ -8195,11 +8256,11 @@ static void tlsphi_push_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
     const tlsph_real dt = (tlsph_real)s->rates.step;
     for (size_t a = block->begin; a < block->end; a++) {
-        const tlsph_real *held = s->held + (D + 2) * a, *rate = s->rate_p + D * a;
+        const tlsph_real *held = tlsphi_held(s, a), *rate = s->rate_p + D * a;
         const tlsph_real per_rho = 1 / tlsphi_material_of(s, a)->rho;
-        tlsph_real heat = held[D], *p = s->now.p + D * a;
+        tlsph_real heat = held[(D + 1) * TLSPHI_LANES], *p = s->now.p + D * a;
         for (size_t k = 0; k < D; k++) {
-            heat -= (p[k] + dt / 2 * rate[k]) * per_rho * held[k];
+            heat -= (p[k] + dt / 2 * rate[k]) * per_rho * held[k * TLSPHI_LANES];
             p[k] += dt * rate[k];
         }
         if (s->rate_J) s->now.J[a] += dt * s->rate_J[a];
@@ -9755,7 +9816,7 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     if (s->keeps_rate) s->rate_F = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D));
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
     s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D)) : s->rate_F;
-    if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, (D + 2) * n);
+    if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D + 2));
     if (s->rates.levels > 1) {
         s->rates.of = TLSPHI_TAKE(arena, uint8_t, n);
         s->rates.list = TLSPHI_TAKE(arena, uint32_t, s->blocks * (size_t)s->rates.levels);
