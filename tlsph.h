@@ -7812,9 +7812,16 @@ static void tlsphi_update_task(void *arg, size_t i) {
     tlsphi_apply_fixes(s, s->now.p, begin, end);
     tlsphi_evaluate_block(s, s->block + i);
 }
+/* The state before a stage. Of the first one that is the old state, and the new one goes to the spare memory, see
+   tlsphi_share_state. */
+static const tlsphi_state *tlsphi_before(tlsph_solver *s) {
+    if (s->now_memory != s->old_memory) return &s->now;
+    s->now = s->spare;
+    s->now_memory = s->spare_memory;
+    return &s->old;
+}
 /* Algorithm 1 line (6). Where no condition needs the whole of the new state, (7) to (9) follow block by block, while it is
-   in the cache: that saves a twentieth of the memory's traffic for each line. In the first stage the state before is the
-   old one, and the new one goes to the spare memory. */
+   in the cache: that saves a twentieth of the memory's traffic for each line. */
 static void tlsphi_evolve(tlsphi_projection *projection, int concludes) {
     tlsph_solver *s = projection->s;
     const tlsphi_stage *stage = &projection->stage;
@@ -7822,11 +7829,7 @@ static void tlsphi_evolve(tlsphi_projection *projection, int concludes) {
     up.s = s;
     up.projection = projection;
     up.concludes = concludes;
-    up.u = s->now_memory == s->old_memory ? &s->old : &s->now;
-    if (up.u == &s->old) {
-        s->now = s->spare;
-        s->now_memory = s->spare_memory;
-    }
+    up.u = tlsphi_before(s);
     up.B = (tlsph_real)stage->b;
     up.C = (tlsph_real)(stage->c * projection->dt);
     tlsphi_run_tasks(s, tlsphi_update_task, &up);
@@ -7942,7 +7945,7 @@ static void tlsphi_keep_state(tlsph_solver *s) {
     memcpy(s->old_memory, s->now_memory, s->state_reals * sizeof *s->now_memory);
     s->account_old = s->account;
 }
-/* The same without a copy, which takes a twentieth of a step: until the first stage has ended (tlsphi_evolve), the old state
+/* The same without a copy, which takes a twentieth of a step: until the first stage has ended (tlsphi_before), the old state
    and the present one are the same memory. For schemes whose first stage writes all of the state. */
 static void tlsphi_share_state(tlsph_solver *s) {
     s->spare = s->old;
@@ -8003,36 +8006,6 @@ TLSPHI_DEF tlsph_real tlsph_cfl_limit(tlsph_integrator integrator) {
    Dissipation and conduction are evaluated with v^n and theta^n, first order in the step; what the dissipation takes
    from the motion is -m.T_D, so the particles get that heat. */
 
-/* u = u_old + C rate of all that grad v moves; J and E from their present value if `on`. */
-typedef struct tlsphi_leap_move {
-    tlsph_solver *s;
-    tlsph_real C;
-    int on;
-    tlsphi_projection *projection;
-} tlsphi_leap_move;
-
-static void tlsphi_drift_task(void *arg, size_t i) {
-    const tlsphi_leap_move *drift = (const tlsphi_leap_move *)arg;
-    tlsph_solver *s = drift->s;
-    const size_t begin = s->block[i].begin, end = s->block[i].end;
-    const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
-    tlsphi_move(s, s->now.x, s->block + i, 0, C);
-    tlsphi_deform(s, &s->now, s->block + i, 0, C);
-    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, on, C);
-    if (s->thermal == TLSPH_ENERGY || (s->thermal && drift->on))
-        tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, on, C);
-    if (s->now.plastic) tlsphi_flow_block(s, s->block + i);
-    if (!drift->on) tlsphi_evaluate_block(s, s->block + i);
-}
-static void tlsphi_kick_task(void *arg, size_t i) {
-    const tlsphi_leap_move *kick = (const tlsphi_leap_move *)arg;
-    tlsph_solver *s = kick->s;
-    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
-    if (kick->projection->leaves) tlsphi_correct_task(kick->projection, i);
-    tlsphi_combine(s->now.p, s->old.p, s->now.p, s->rate_p, D * begin, D * end, 0, kick->C);
-    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, 0, kick->C);
-    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, 0, kick->C);
-}
 /* v becomes m. */
 static void tlsphi_mean_velocity_block(tlsph_solver *s, tlsphi_block *block) {
     const size_t D = (size_t)s->dim;
@@ -8063,6 +8036,43 @@ static void tlsphi_mean_work_block(tlsph_solver *s, tlsphi_block *block) {
     }
     block->sums[TLSPHI_SUM_DISSIPATION] += dissipated;
     block->sums[TLSPHI_SUM_DISSIPATION_ENTROPY] += entropy;
+}
+/* u_old + C rate of all that grad v moves; `on`: with the second half of a step, J and E from their present value. */
+typedef struct tlsphi_leap_move {
+    tlsph_solver *s;
+    const tlsphi_state *u; /* of the F in dH/dt */
+    tlsph_real C;
+    int on, concludes; /* no condition waits for the whole of the state */
+    tlsphi_projection *projection;
+} tlsphi_leap_move;
+
+static void tlsphi_drift_task(void *arg, size_t i) {
+    const tlsphi_leap_move *drift = (const tlsphi_leap_move *)arg;
+    tlsph_solver *s = drift->s;
+    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
+    const tlsph_real C = drift->C, on = drift->on ? TLSPHI_R(1) : 0;
+    const tlsph_real C_E = s->thermal == TLSPH_ENERGY || drift->on ? C : 0;
+    const tlsphi_state *u = drift->u;
+    if (drift->on) tlsphi_mean_work_block(s, s->block + i);
+    if (u == &s->old) memcpy(s->now.p + D * begin, u->p + D * begin, D * (end - begin) * sizeof *u->p);
+    tlsphi_move(s, u->x, s->block + i, 0, C);
+    tlsphi_deform(s, u, s->block + i, 0, C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, u->J, s->rate_J, begin, end, on, C);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, u->E, s->rate_E, begin, end, on, C_E);
+    if (s->now.plastic) tlsphi_flow_block(s, s->block + i);
+    if (!drift->on || drift->concludes) tlsphi_evaluate_block(s, s->block + i);
+}
+static void tlsphi_kick_task(void *arg, size_t i) {
+    const tlsphi_leap_move *kick = (const tlsphi_leap_move *)arg;
+    tlsph_solver *s = kick->s;
+    const size_t D = (size_t)s->dim, begin = s->block[i].begin, end = s->block[i].end;
+    if (kick->projection->leaves) tlsphi_correct_task(kick->projection, i);
+    tlsphi_combine(s->now.p, s->old.p, s->now.p, s->rate_p, D * begin, D * end, 0, kick->C);
+    if (s->has_J) tlsphi_combine(s->now.J, s->old.J, s->now.J, s->rate_J, begin, end, 0, kick->C);
+    if (s->now.E) tlsphi_combine(s->now.E, s->old.E, s->now.E, s->rate_E, begin, end, 0, kick->C);
+    if (!kick->concludes) return;
+    tlsphi_apply_fixes(s, s->now.p, begin, end);
+    tlsphi_mean_velocity_block(s, s->block + i);
 }
 /* The work of loads has been taken with v^n: the rest of that with m. */
 static void tlsphi_mean_work_of_loads(tlsph_solver *s, double dt) {
@@ -8112,22 +8122,26 @@ static const tlsphi_block *tlsphi_leap(tlsph_solver *s, const tlsphi_stage *stag
     drift.s = s;
     drift.projection = &projection;
     drift.on = 0;
+    drift.concludes = !s->constrains;
     drift.C = (tlsph_real)(dt / 2);
     tlsphi_leap_gradients(&projection, 1);
+    drift.u = tlsphi_before(s);
+    projection.x = s->now.x; /* those of the half from here on */
     tlsphi_run_tasks(s, tlsphi_drift_task, &drift);
     const tlsphi_block *bad = tlsphi_evaluated(s);
     if (bad) return bad;
     tlsphi_leap_forces(&projection);
     drift.C = (tlsph_real)dt;
     tlsphi_run_tasks(s, tlsphi_kick_task, &drift);
-    tlsphi_constrain(s, stage, dt);
-    tlsphi_run(s, tlsphi_mean_velocity_block);
+    if (s->constrains) tlsphi_constrain(s, stage, dt);
+    if (s->constrains) tlsphi_run(s, tlsphi_mean_velocity_block);
     tlsphi_mean_work_of_loads(s, dt);
     tlsphi_leap_gradients(&projection, 0);
-    tlsphi_run(s, tlsphi_mean_work_block);
-    tlsphi_collect_sums(s, dt);
     drift.on = 1;
+    drift.u = &s->now;
     tlsphi_run_tasks(s, tlsphi_drift_task, &drift);
+    tlsphi_collect_sums(s, dt);
+    if (!s->constrains) return tlsphi_evaluated(s);
     tlsphi_hold_temperatures(s, stage, dt);
     return tlsphi_evaluate(s);
 }
@@ -8430,7 +8444,7 @@ static size_t tlsphi_shrunk(const tlsph_solver *s, double *share) {
 static tlsph_result tlsphi_step_by(tlsph_solver *s, double dt) {
     const tlsphi_scheme *scheme = tlsphi_schemes + s->integrator;
     const int split = s->super.most && dt > tlsphi_heat_step(s);
-    if (split || s->leaps || s->incompressible || s->now.plastic) tlsphi_keep_state(s); /* (1) u_old, x_old */
+    if (split || s->rates.levels > 1 || s->incompressible || s->now.plastic) tlsphi_keep_state(s); /* (1) u_old, x_old */
     else tlsphi_share_state(s);
     if (split) {
         const tlsphi_block *bad = tlsphi_conduct(s, s->time, dt / 2);
