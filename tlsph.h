@@ -3601,14 +3601,14 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
 
 /* Rows of a block. w is v without the body's rigid motion, as the dissipation sees it (without projection w is v);
    P = P M, as the forces have it, A = H M, slope_w the gradient of w that reconstruction takes; wave (c_p, c_s, rho, with J
-   the drift ratio; X and rho are set at creation); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M and
-   grad w beside the sharpened. */
+   the drift ratio; X and rho are set at creation); heat M^T Q/theta; h_J h/J. Sharp gradients keep the plain P M,
+   grad w and grad v beside the sharpened. */
 typedef struct tlsphi_rows {
     int v, w, X, P, A, slope_w, wave; /* D, D, D, DD, DD, DD, 3 or 4 */
     int S, slope_S;                   /* 1, D: Sigma_J; with J */
     int theta;                        /* 1; thermal */
     int slope_theta, heat, h_J;       /* D, D, 1; with conduction */
-    int PM, grad_w;                   /* DD, DD */
+    int PM, grad_w, grad_v;           /* DD, DD, DD side by side; without sharp gradients P, slope_w and none */
     int lap_p;                        /* D; JST */
     int count;
 } tlsphi_rows;
@@ -3633,7 +3633,8 @@ TLSPHI_INLINE tlsphi_rows tlsphi_rows_of(const int dim, const int has_J, int the
     r.count = r.h_J + (conducts ? 1 : 0);
     r.PM = sharp ? r.count : r.P;
     r.grad_w = sharp ? r.count + dd : r.slope_w;
-    r.count += sharp ? 2 * dd : 0;
+    r.grad_v = r.count + 2 * dd;
+    r.count += sharp ? 3 * dd : 0;
     return r;
 }
 
@@ -3809,7 +3810,6 @@ struct tlsph_solver {
     tlsph_real *rate_p, *rate_F, *rate_J, *rate_E;
     tlsphi_rows rows;
     tlsph_real *row;         /* blocks of rows, see above */
-    tlsph_real *grad_v;      /* rate_F but for sharp gradients. Both NULL: see tlsphi_take_turn */
     int lanes;               /* fluxes by lanes, see [FLUXES] */
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
@@ -3926,6 +3926,12 @@ TLSPHI_INLINE void tlsphi_tensor_get(const tlsph_real *field, const int dd, size
 TLSPHI_INLINE void tlsphi_tensor_put(tlsph_real *field, const int dd, size_t a, const tlsph_real *in) {
     tlsph_real *at = field + tlsphi_tensor_at((size_t)dd, a);
     TLSPHI_UNROLL for (int i = 0; i < dd; i++) at[(size_t)i * TLSPHI_LANES] = in[i];
+}
+/* grad v of particle a, whose components are `apart` from each other: rate_F but for sharp gradients. Only where
+   keeps_rate is set, see tlsphi_take_turn. */
+TLSPHI_INLINE tlsph_real *tlsphi_grad_v(const tlsph_solver *s, size_t a, size_t *apart) {
+    *apart = s->sharp ? TLSPHI_ROW : TLSPHI_LANES;
+    return s->sharp ? tlsphi_at(s, s->rows.grad_v, a) : s->rate_F + tlsphi_tensor_at((size_t)(s->dim * s->dim), a);
 }
 /* Dissipation that outlasts the pass, by tiles: D_p, D_J and the power, see tlsphi_keep_damping. */
 TLSPHI_INLINE tlsph_real *tlsphi_held(const tlsph_solver *s, size_t a) {
@@ -4883,9 +4889,10 @@ static void tlsphi_held_jump(const tlsph_solver *s, const tlsphi_held_part *h, c
 /* Adds the jumps at the held parts [h, end) of one particle to its gradients, and their power to E. */
 static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tlsphi_held_part *end) {
     const int dim = s->dim;
-    const size_t D = (size_t)dim, dd = D * D, a = h->particle;
-    tlsph_real G[9], P[9], *grad = s->grad_v + tlsphi_tensor_at(dd, a);
-    tlsphi_tensor_get(s->grad_v, (int)dd, a, G);
+    const size_t D = (size_t)dim, a = h->particle;
+    size_t apart;
+    tlsph_real G[9], P[9], *grad = tlsphi_grad_v(s, a, &apart);
+    tlsphi_take_apart(dim * dim, grad, apart, G);
     tlsphi_stress_behind(s, h, P);
     for (; h != end; h++)
         for (size_t j = 0; j <= D; j++) { /* column j of S [...], at last the jump at the middle itself */
@@ -4896,7 +4903,7 @@ static void tlsphi_hold_gradient(tlsph_solver *s, tlsphi_held_part *h, const tls
             tlsphi_held_jump(s, h, G, h->part.B[j], h->part.T + D * j, column);
             for (size_t i = 0; i < D; i++) {
                 const tlsph_real change = column[i] / s->V[a];
-                grad[(D * i + j) * TLSPHI_LANES] += change;
+                grad[(D * i + j) * apart] += change;
                 tlsphi_at(s, s->rows.grad_w, a)[(D * i + j) * TLSPHI_ROW] += change;
                 if (s->rate_E) s->rate_E[a] += P[D * i + j] * change;
             }
@@ -5260,7 +5267,9 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     }
     tlsphi_finish_gradients(scale, M, dim, dim, sum->v);
     if (with_w) tlsphi_finish_gradients(scale, M, dim, dim, sum->w);
-    if (s->grad_v) tlsphi_store_lanes(dd, sum->v, first, last, TLSPHI_LANES, s->grad_v + (size_t)dd * base);
+    size_t apart;
+    tlsph_real *grad_v = s->keeps_rate ? tlsphi_grad_v(s, base, &apart) : NULL;
+    if (grad_v) tlsphi_store_lanes(dd, sum->v, first, last, apart, grad_v);
     if (s->projection && !s->gathers_w) tlsphi_take_turn(s, s->body + block->body, base, first, last, dim, w);
     tlsphi_store_rows(dd, w, first, last, row + (size_t)s->rows.grad_w * TLSPHI_ROW);
     if (with_S) {
@@ -5306,7 +5315,9 @@ static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
     }
     tlsphi_row_get(s, r->PM, (int)dd, a, PM);
     if (s->rate_E) s->rate_E[a] += tlsphi_dot(dim * dim, PM, Gw);
-    for (size_t i = 0; i < dd; i++) s->grad_v[tlsphi_tensor_at(dd, a) + i * TLSPHI_LANES] += G[i];
+    size_t apart;
+    tlsph_real *grad_v = tlsphi_grad_v(s, a, &apart);
+    for (size_t i = 0; i < dd; i++) grad_v[i * apart] += G[i];
     for (size_t i = 0; i < dd; i++) tlsphi_at(s, r->grad_w, a)[i * TLSPHI_ROW] += Gw[i];
 }
 
@@ -5325,10 +5336,12 @@ static void tlsphi_mirror_gradients(tlsph_solver *s, size_t a) {
     if (s->has_J) tlsphi_mirror_slope(s, r->slope_S, 0, a);
     if (s->conducts) tlsphi_mirror_slope(s, r->slope_theta, 1, a);
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++) {
-        if (s->grad_v) {
-            tlsphi_tensor_get(s->grad_v, dd, a, Gw);
+        if (s->keeps_rate) {
+            size_t apart;
+            tlsph_real *grad_v = tlsphi_grad_v(s, a, &apart);
+            tlsphi_take_apart(dd, grad_v, apart, Gw);
             tlsphi_mirror_tensor(dim, m, Gw);
-            tlsphi_tensor_put(s->grad_v, dd, a, Gw);
+            for (size_t i = 0; i < (size_t)dd; i++) grad_v[i * apart] = Gw[i];
         }
         tlsphi_row_get(s, r->grad_w, dd, a, Gw);
         tlsphi_mirror_tensor(dim, m, Gw);
@@ -5396,12 +5409,13 @@ static void tlsphi_odd_part(const tlsphi_image *image, int dim, tlsph_real *v) {
 static void tlsphi_image_gradient(const tlsph_solver *s, const tlsphi_image *image) {
     const size_t D = (size_t)s->dim, a = image->particle, axis = (size_t)image->axis;
     const tlsph_real factor = -image->c / s->V[a];
-    tlsph_real odd[3] = {0, 0, 0};
+    size_t apart;
+    tlsph_real odd[3] = {0, 0, 0}, *grad_v = tlsphi_grad_v(s, a, &apart);
     tlsphi_velocity(s, a, odd);
     tlsphi_odd_part(image, s->dim, odd);
     for (size_t i = 0; i < D; i++) {
         const size_t row = (D * i + axis) * TLSPHI_ROW;
-        s->grad_v[tlsphi_tensor_at(D * D, a) + (D * i + axis) * TLSPHI_LANES] += factor * odd[i];
+        grad_v[(D * i + axis) * apart] += factor * odd[i];
         tlsphi_at(s, s->rows.grad_w, a)[row] += factor * odd[i];
         if (s->rate_E) s->rate_E[a] += tlsphi_at(s, s->rows.PM, a)[row] * factor * odd[i];
     }
@@ -5486,61 +5500,152 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
    number over TLSPHI_SHARP_STEP. At CFL 0.3 that is 0.067 > 0.048. */
 #define TLSPHI_SHARP_REACH 1.4 /* r */
 
-/* correction: sum_b ((g_b - g_a) d) (x) C_ab;  moment: sum_b ((P_a - P_b) C_ab) (x) d;  relative: the first with grad w */
-TLSPHI_INLINE void tlsphi_sharp_sums(const tlsph_solver *s, size_t a, const int dim, tlsph_real *correction,
-                                     tlsph_real *relative, tlsph_real *moment) {
+/* Sums of a particle: ((g_b - g_a) d) (x) C_ab, with grad w and with grad v for g; ((P_a - P_b) C_ab) (x) d. */
+typedef struct TLSPHI_ALIGNED tlsphi_sharp_sums {
+    tlsph_real moment[9 * TLSPHI_LANES], relative[9 * TLSPHI_LANES], correction[9 * TLSPHI_LANES];
+} tlsphi_sharp_sums;
+
+/* sum += ((Z_b - Z_a) u) (x) t for the components that u and t have */
+TLSPHI_INLINE void tlsphi_add_change(const tlsph_real *a, const tlsph_real *b, const size_t apart, const tlsph_real *u,
+                                     const tlsph_real *t, const int dim, const int width, const size_t *columns,
+                                     tlsph_real *sum) {
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) {
+            tlsph_real jump = 0;
+            TLSPHI_UNROLL for (size_t j = 0; j < (size_t)width; j++) {
+                const size_t k = (size_t)dim * i + columns[j];
+                jump += (b[k * apart + l] - a[k * TLSPHI_LANES + l]) * u[columns[j] * TLSPHI_LANES + l];
+            }
+            TLSPHI_UNROLL for (size_t j = 0; j < (size_t)width; j++)
+                sum[((size_t)dim * i + columns[j]) * TLSPHI_LANES + l] += jump * t[columns[j] * TLSPHI_LANES + l];
+        }
+}
+/* The rows PM, grad_w and grad_v lie side by side: a holds those of the tile, b those of the neighbours. */
+TLSPHI_INLINE void tlsphi_add_changes(const tlsph_real *a, const tlsph_real *b, const size_t apart, const tlsph_real *d,
+                                      const tlsph_real *g, const int dim, const int width, const size_t *columns,
+                                      tlsphi_sharp_sums *sum) {
+    const size_t dd = (size_t)(dim * dim);
+    tlsphi_add_change(a, b, apart, g, d, dim, width, columns, sum->moment);
+    tlsphi_add_change(a + dd * TLSPHI_LANES, b + dd * apart, apart, d, g, dim, width, columns, sum->relative);
+    tlsphi_add_change(a + 2 * dd * TLSPHI_LANES, b + 2 * dd * apart, apart, d, g, dim, width, columns, sum->correction);
+}
+TLSPHI_INLINE void tlsphi_sum_sharp(const tlsph_solver *s, size_t tile, size_t base, const int dim,
+                                    tlsphi_sharp_sums *sum) {
+    const tlsphi_graph *graph = &s->graph;
+    const tlsphi_rows *r = &s->rows;
+    const int dd = dim * dim;
+    const size_t *const all = tlsphi_columns[7];
+    TLSPHI_ALIGNED tlsph_real a[27 * TLSPHI_LANES], X_a[3 * TLSPHI_LANES], d[3 * TLSPHI_LANES];
+    TLSPHI_ALIGNED tlsph_real b_of[27 * TLSPHI_LANES], X_of[3 * TLSPHI_LANES]; /* collected */
+    tlsphi_clear_lanes(dd, sum->moment);
+    tlsphi_clear_lanes(dd, sum->relative);
+    tlsphi_clear_lanes(dd, sum->correction);
+    tlsphi_take_tile(tlsphi_at(s, r->PM, base), 0, 3 * dd, a);
+    tlsphi_take_tile(tlsphi_at(s, r->X, base), 0, dim, X_a);
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const tlsphi_slot *slot = graph->slot + k;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+        const tlsph_real *b = b_of, *X_b = X_of, *at[TLSPHI_LANES];
+        size_t apart = TLSPHI_LANES;
+        if (slot->scattered) {
+            TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+                at[l] = tlsphi_at(s, r->X, graph->gathered[slot->from + l]);
+            tlsphi_collect_rows(at, 0, dim, X_of);
+            tlsphi_collect_rows(at, (size_t)(r->PM - r->X) * TLSPHI_ROW, 3 * dd, b_of);
+        } else {
+            b = tlsphi_at(s, r->PM, slot->from);
+            X_b = tlsphi_at(s, r->X, slot->from);
+            apart = TLSPHI_ROW;
+        }
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
+            TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++)
+                d[i * TLSPHI_LANES + l] = X_b[i * apart + l] - X_a[i * TLSPHI_LANES + l];
+        if (slot->axes == 1) tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[1], sum);
+        else if (slot->axes == 2) tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[2], sum);
+        else if (dim == 3 && slot->axes == 4) tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[4], sum);
+        else tlsphi_add_changes(a, b, apart, d, g, dim, dim, all, sum);
+    }
+}
+/* The same for the particles [begin, end) of a tile, pair by pair. */
+TLSPHI_INLINE void tlsphi_sum_sharp_pairs(const tlsph_solver *s, size_t begin, size_t end, const int dim,
+                                          tlsphi_sharp_sums *sum) {
     const size_t D = (size_t)dim;
     const int dd = dim * dim;
-    tlsph_real P_a[9], w_a[9], g_a[9];
-    tlsphi_row_get(s, s->rows.PM, dd, a, P_a);
-    tlsphi_row_get(s, s->rows.grad_w, dd, a, w_a);
-    tlsphi_tensor_get(s->grad_v, dd, a, g_a);
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const size_t b = s->neighbour[k];
-        tlsph_real d[3], change[9], jump[3];
-        tlsphi_tensor_get(s->grad_v, dd, b, change);
-        tlsphi_pair_arm(s, a, b, dim, d);
-        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] -= g_a[i];
-        tlsphi_multiply(dim, change, d, jump);
-        tlsphi_add_outer(dim, correction, jump, s->g + D * k);
-        tlsphi_row_get(s, s->rows.grad_w, dd, b, change);
-        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] -= w_a[i];
-        tlsphi_multiply(dim, change, d, jump);
-        tlsphi_add_outer(dim, relative, jump, s->g + D * k);
-        tlsphi_row_get(s, s->rows.PM, dd, b, change);
-        TLSPHI_UNROLL for (int i = 0; i < dd; i++) change[i] = P_a[i] - change[i];
-        tlsphi_multiply(dim, change, s->g + D * k, jump);
-        tlsphi_add_outer(dim, moment, jump, d);
+    memset(sum, 0, sizeof *sum);
+    for (size_t a = begin; a < end; a++) {
+        tlsph_real *const to[3] = {sum->moment, sum->relative, sum->correction};
+        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
+            const size_t b = s->neighbour[k];
+            tlsph_real d[3];
+            tlsphi_pair_arm(s, a, b, dim, d);
+            for (int z = 0; z < 3; z++) {
+                const tlsph_real *u = z ? d : s->g + D * k, *t = z ? s->g + D * k : d;
+                tlsph_real Z_a[9], Z_b[9], jump[3], change[9] = {0};
+                tlsphi_row_get(s, s->rows.PM + z * dd, dd, a, Z_a);
+                tlsphi_row_get(s, s->rows.PM + z * dd, dd, b, Z_b);
+                for (int i = 0; i < dd; i++) Z_b[i] -= Z_a[i];
+                tlsphi_multiply(dim, Z_b, u, jump);
+                tlsphi_add_outer(dim, change, jump, t);
+                for (int i = 0; i < dd; i++) to[z][(size_t)i * TLSPHI_LANES + a % TLSPHI_LANES] += change[i];
+            }
+        }
     }
 }
 static void tlsphi_mirror_all(const tlsph_solver *s, size_t a, tlsph_real *G) {
     for (const tlsphi_mirror *m = tlsphi_mirrors_of(s, a); m && m->particle == a; m++)
         tlsphi_mirror_tensor(s->dim, m, G);
 }
-TLSPHI_INLINE void tlsphi_sharpen_particle(tlsph_solver *s, size_t a, const int dim) {
-    const size_t dd = (size_t)(dim * dim), at = tlsphi_tensor_at(dd, a);
-    const tlsph_real sixth = 1 / (6 * s->V[a]), reach = sixth * TLSPHI_R(TLSPHI_SHARP_REACH);
-    tlsph_real correction[9] = {0}, moment[9] = {0}, relative[9] = {0}, P[9], slope[9];
-    tlsphi_sharp_sums(s, a, dim, correction, relative, moment);
-    tlsphi_mirror_all(s, a, correction);
-    tlsphi_mirror_all(s, a, relative);
-    tlsphi_mirror_all(s, a, moment);
-    tlsphi_row_get(s, s->rows.PM, (int)dd, a, P);
-    tlsphi_row_get(s, s->rows.grad_w, (int)dd, a, slope);
-    if (s->rate_E) s->rate_E[a] -= sixth * tlsphi_dot(dim * dim, P, relative);
-    for (size_t i = 0; i < dd; i++) {
-        s->rate_F[at + i * TLSPHI_LANES] = s->grad_v[at + i * TLSPHI_LANES] - sixth * correction[i];
-        slope[i] -= reach * relative[i];
-        P[i] += sixth * moment[i];
+static void tlsphi_mirror_lane(const tlsph_solver *s, size_t a, tlsph_real *sum) {
+    tlsph_real G[9], *at = sum + a % TLSPHI_LANES;
+    tlsphi_take_apart(s->dim * s->dim, at, TLSPHI_LANES, G);
+    tlsphi_mirror_all(s, a, G);
+    for (size_t i = 0; i < (size_t)(s->dim * s->dim); i++) at[i * TLSPHI_LANES] = G[i];
+}
+/* What becomes of the sums of the lanes [first, last). */
+TLSPHI_INLINE void tlsphi_store_sharp(const tlsph_solver *s, size_t base, size_t first, size_t last, const int dim,
+                                      tlsphi_sharp_sums *sum) {
+    const tlsphi_rows *r = &s->rows;
+    const tlsph_real *PM = tlsphi_at(s, r->PM, base), *A = tlsphi_at(s, r->A, base);
+    const tlsph_real *w = tlsphi_at(s, r->grad_w, base), *v = tlsphi_at(s, r->grad_v, base);
+    tlsph_real scale[TLSPHI_LANES], heat[TLSPHI_LANES], growth[TLSPHI_LANES];
+    tlsphi_half_per_volume(s, base, first, last, scale);
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        const tlsph_real sixth = scale[l] * TLSPHI_R(1.0 / 3.0), reach = sixth * TLSPHI_R(TLSPHI_SHARP_REACH);
+        tlsph_real power = 0, HG = 0;
+        TLSPHI_UNROLL for (size_t i = 0; i < (size_t)(dim * dim); i++) {
+            const size_t k = i * TLSPHI_LANES + l, row = i * TLSPHI_ROW + l;
+            power += PM[row] * sum->relative[k];
+            sum->correction[k] = v[row] - sixth * sum->correction[k];
+            HG += A[row] * sum->correction[k];
+            sum->relative[k] = w[row] - reach * sum->relative[k];
+            sum->moment[k] = PM[row] - sixth * sum->moment[k];
+        }
+        heat[l] = sixth * power;
+        growth[l] = HG;
     }
-    tlsphi_row_put(s, s->rows.slope_w, (int)dd, a, slope);
-    tlsphi_row_put(s, s->rows.P, (int)dd, a, P);
-    if (s->rate_J) tlsphi_jacobian_rate(s, NULL, a);
+    for (size_t l = first; s->rate_E && l < last; l++) s->rate_E[base + l] -= heat[l];
+    if (s->rate_J) tlsphi_store_lanes(1, growth, first, last, 0, s->rate_J + base);
+    tlsphi_store_rows(dim * dim, sum->moment, first, last, tlsphi_at(s, r->P, base));
+    tlsphi_store_rows(dim * dim, sum->relative, first, last, tlsphi_at(s, r->slope_w, base));
+    tlsphi_store_lanes(dim * dim, sum->correction, first, last, TLSPHI_LANES, s->rate_F + (size_t)(dim * dim) * base);
+}
+TLSPHI_INLINE void tlsphi_sharpen_tile(tlsph_solver *s, size_t tile, size_t begin, size_t end, const int dim) {
+    const size_t base = begin / TLSPHI_LANES * TLSPHI_LANES;
+    tlsphi_sharp_sums sum;
+    if (s->lanes) tlsphi_sum_sharp(s, tile, base, dim, &sum);
+    else tlsphi_sum_sharp_pairs(s, begin, end, dim, &sum);
+    for (size_t a = begin; s->mirrors && a < end; a++) {
+        tlsphi_mirror_lane(s, a, sum.moment);
+        tlsphi_mirror_lane(s, a, sum.relative);
+        tlsphi_mirror_lane(s, a, sum.correction);
+    }
+    tlsphi_store_sharp(s, base, begin - base, end - base, dim, &sum);
 }
 static void tlsphi_sharpen_block(tlsph_solver *s, tlsphi_block *block) {
-    for (size_t a = block->begin; a < block->end; a++) {
-        if (s->dim == 3) tlsphi_sharpen_particle(s, a, 3);
-        else tlsphi_sharpen_particle(s, a, 2);
+    for (size_t a = block->begin, tile = block->tile, end; a < block->end; a = end, tile++) {
+        end = tlsphi_tile_end(block, a);
+        if (s->dim == 3) tlsphi_sharpen_tile(s, tile, a, end, 3);
+        else tlsphi_sharpen_tile(s, tile, a, end, 2);
     }
 }
 
@@ -9797,7 +9902,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
     }
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
     s->heat_moves = s->conducts;
-    s->keeps_pairs = d->keep_pairs || !s->lanes || s->sharp || s->incompressible || d->particles.moments ||
+    s->keeps_pairs = d->keep_pairs || !s->lanes || s->incompressible || d->particles.moments ||
                      s->step_rule != TLSPH_STEP_BY_PARTICLE;
     s->super.most = s->conducts && d->conduction_stages ? (d->conduction_stages - 1) | 1 : 0; /* odd: RKL2 damps better */
     for (size_t i = 0; i < d->condition_count; i++) {
@@ -9829,7 +9934,6 @@ static void tlsphi_layout_work(tlsph_solver *s, tlsphi_arena *arena) {
     s->rate_p = TLSPHI_TAKE(arena, tlsph_real, D * n);
     if (s->keeps_rate) s->rate_F = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D));
     s->row = TLSPHI_TAKE(arena, tlsph_real, s->blocks * (size_t)s->rows.count * TLSPHI_ROW);
-    s->grad_v = s->sharp ? TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D * D)) : s->rate_F;
     if (s->frozen || s->leaps) s->held = TLSPHI_TAKE(arena, tlsph_real, tlsphi_tensor_reals(n, D + 2));
     if (s->rates.levels > 1) {
         s->rates.of = TLSPHI_TAKE(arena, uint8_t, n);

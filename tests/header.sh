@@ -143,8 +143,8 @@ link="$cc -std=c99 -O0 $common"
 ok "two units link and run" "$link -no-pie $work/user.c $work/second.c $work/double.o -lm -o $work/linked && $work/linked"
 ok "float units link and run" "$link -DTLSPH_REAL_FLOAT $work/user.c $work/second.c $work/float.o -lm -o $work/linked_float && $work/linked_float"
 # The linker must complain, and about the name that binds the precision.
-ok "float unit refuses a double library" "$link -DTLSPH_REAL_FLOAT -no-pie $work/user.c $work/double.o -lm -o $work/mixed 2>&1 | grep tlsph_create_float && test ! -e $work/mixed"
-ok "double unit refuses a float library" "$link $work/user.c $work/float.o -lm -o $work/mixed 2>&1 | grep 'tlsph_create\b' && test ! -e $work/mixed"
+ok "float unit refuses a double library" "$link -DTLSPH_REAL_FLOAT -no-pie $work/user.c $work/double.o -lm -o $work/mixed_float 2>&1 | grep tlsph_create_float && test ! -e $work/mixed_float"
+ok "double unit refuses a float library" "$link $work/user.c $work/float.o -lm -o $work/mixed_double 2>&1 | grep 'tlsph_create\b' && test ! -e $work/mixed_double"
 if have g++; then
     ok "C++ unit with the C library" "g++ -std=c++11 -I$root -no-pie $work/user.cpp $work/double.o -lm -o $work/linked_cpp && $work/linked_cpp"
 else skip "no g++ to link with"; fi

@@ -231,6 +231,8 @@ static tlsph_desc moving_block_desc(const moving_block *s, const own_cloud *clou
     desc.run_user = s->run_user;
     desc.allocator = s->allocator;
     if (s->jitter > 0) desc.support = R(0.9);
+    desc.sharp_gradients = s->sharp;
+    if (s->sharp) desc.operator_kind = TLSPH_CELLS;
     return desc;
 }
 

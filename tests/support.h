@@ -55,6 +55,7 @@ typedef struct moving_block {
     tlsph_integrator integrator;
     tlsph_dissipation dissipation;
     int threads, audit;
+    int sharp;               /* sharp gradients, by cells */
     int slides;              /* 1: along a roller at X = 0, not clamped */
     int unloaded;            /* 1: only clamped; 2: and above a wall out of reach */
     tlsph_run_fn run; void *run_user;

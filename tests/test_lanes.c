@@ -39,22 +39,28 @@ static double difference(const tlsph_solver *a, const tlsph_solver *b, tlsph_fie
 /* Of two sums. */
 static double apart(double a, double b) { return a == b ? 0 : fabs(a - b) / fmax(fabs(a), fabs(b)); }
 
+static double compare_states(tlsph_solver *const solver[2])
+{
+    tlsph_ledger ledger[2];
+    double worst;
+    for (int i = 0; i < 2; i++) tlsph_ledger_read(solver[i], ledger + i);
+    worst = fmax(apart(ledger[0].dissipation, ledger[1].dissipation),
+                 apart(ledger[0].dissipation_entropy, ledger[1].dissipation_entropy));
+    for (size_t f = 0; f < sizeof compared / sizeof *compared; f++)
+        worst = fmax(worst, difference(solver[0], solver[1], compared[f]));
+    return worst;
+}
 static double compare(moving_block s, double speed, int steps)
 {
     tlsph_solver *solver[2] = { NULL, NULL };
-    tlsph_ledger ledger[2];
     double worst = 0;
     for (int i = 0; i < 2; i++) {
         s.audit = i;
         if (!CHECK_RESULT(moving_block_create(&s, solver + i, NULL), TLSPH_OK)) return 0;
         CHECK_RESULT(moving_block_kick(solver[i], speed), TLSPH_OK);
         CHECK_RESULT(take_steps(solver[i], steps), TLSPH_OK);
-        tlsph_ledger_read(solver[i], ledger + i);
     }
-    worst = fmax(apart(ledger[0].dissipation, ledger[1].dissipation),
-                 apart(ledger[0].dissipation_entropy, ledger[1].dissipation_entropy));
-    for (size_t f = 0; f < sizeof compared / sizeof *compared; f++)
-        worst = fmax(worst, difference(solver[0], solver[1], compared[f]));
+    worst = compare_states(solver);
     for (int i = 0; i < 2; i++) tlsph_destroy(solver[i]);
     return worst;
 }
@@ -147,6 +153,75 @@ TEST(frozen_dissipation)
     compare_all(s, 0.5);
     compare_all(flat, 0.5);
 }
+TEST(sharp_gradients)
+{
+    for (int i = 0; i < 4; i++) {
+        moving_block s = body(2 + i % 2, 0);
+        s.sharp = 1;
+        s.slides = i < 2;
+        if (i > 1) s.integrator = TLSPH_LEAPFROG;
+        compare_all(s, 0.5);
+    }
+}
+/* Pairs in all directions, whose vectors are antisymmetric. */
+TEST(sharp_gradients_of_clouds)
+{
+    tlsph_fill fill = tlsph_fill_default(3);
+    tlsph_material material = soft_material(TLSPH_NEO_HOOKEAN);
+    tlsph_solver *solver[2] = { NULL, NULL };
+    tlsph_cloud cloud;
+    for (int i = 0; i < 3; i++) fill.size[i] = 1;
+    fill.spacing = R(0.2);
+    fill.placement = TLSPH_SCATTERED;
+    fill.jitter = R(0.1);
+    REQUIRE_OK(tlsph_cloud_create(&fill, &cloud, NULL));
+    for (int i = 0; i < 2; i++) {
+        tlsph_desc desc = tlsph_desc_default(3);
+        desc.particles = cloud.particles;
+        desc.materials = &material;
+        desc.material_count = 1;
+        desc.unknowns = TLSPH_PFHJ;
+        desc.sharp_gradients = 1;
+        desc.threads = 1;
+        desc.audit = i;
+        closed_operator(&desc);
+        if (!CHECK_RESULT(tlsph_create(&desc, solver + i, NULL), TLSPH_OK)) break;
+        CHECK_RESULT(moving_block_kick(solver[i], 0.5), TLSPH_OK);
+        CHECK_RESULT(take_steps(solver[i], 3), TLSPH_OK);
+    }
+    if (solver[1]) {
+        const double worst = compare_states(solver);
+        CHECK(worst < tolerance(TLSPH_ISOTHERMAL));
+        REPORT(" %.1e", worst);
+    }
+    for (int i = 0; i < 2; i++) tlsph_destroy(solver[i]);
+    tlsph_cloud_destroy(&cloud);
+}
+/* J follows det F: both change by the sharp gradient, and only the steps are finite. */
+TEST(sharp_gradients_of_J)
+{
+    double drift[2] = { 0, 0 };
+    for (int i = 0; i < 2; i++) {
+        moving_block s = body(3, 0);
+        tlsph_solver *solver;
+        s.sharp = 1;
+        s.unknowns = TLSPH_PFJ;
+        s.thermal = TLSPH_ISOTHERMAL;
+        s.dissipation = TLSPH_NO_DISSIPATION;
+        REQUIRE_OK(moving_block_create(&s, &solver, NULL));
+        CHECK_RESULT(moving_block_kick(solver, 0.5), TLSPH_OK);
+        const tlsph_real dt = tlsph_stable_time_step(solver) / R(1 << i) / 2;
+        for (int k = 0; k < 4 << i; k++) CHECK_RESULT(tlsph_step(solver, dt), TLSPH_OK);
+        tlsph_real *J = read_field(solver, TLSPH_FIELD_J), *F = read_field(solver, TLSPH_FIELD_F);
+        for (size_t a = 0; a < tlsph_count(solver); a++)
+            drift[i] = fmax(drift[i], fabs((double)(J[a] - tlsph_determinant(F + 9 * a))));
+        free(J);
+        free(F);
+        tlsph_destroy(solver);
+    }
+    REPORT(" %.1e, half the step: %.1e", drift[0], drift[1]);
+    CHECK_BELOW(drift[1], fmax(0.3 * drift[0], 20 * EPSILON));
+}
 TEST(other_dissipations)
 {
     static const tlsph_dissipation kinds[] = { TLSPH_RECONSTRUCTED, TLSPH_FIRST_ORDER, TLSPH_NO_DISSIPATION,
@@ -224,4 +299,6 @@ TEST(temperatures_of_round_off)
 }
 
 SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(mirrors), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
-      ENTRY(leapfrog), ENTRY(frozen_dissipation), ENTRY(other_dissipations), ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
+      ENTRY(leapfrog), ENTRY(frozen_dissipation), ENTRY(sharp_gradients),
+      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(other_dissipations),
+      ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
