@@ -49,7 +49,7 @@ double bound_bytes(const tlsph_solver *s) {
 static double of_pair(const tlsph_solver *s, double w) {
     const double D = s->dim, all = w > 1 ? D : 1, J = s->has_J, damps = s->dissipation != TLSPH_NO_DISSIPATION;
     const double slopes = (D * (s->gathers_w ? 2 : 1) + J + s->conducts) * (1 + 2 * all);
-    const double damping = (7 * D + 1) * w + 20 * D + 20 + J * (4 * w + 17) + D + 2;
+    const double damping = (6 * D + 3) * w + 18 * D + 24 + J * (3 * w + 17);
     return slopes + D * (3 * w + 1) + damps * damping + s->conducts * (22 * all + 30);
 }
 /* Pairs have vectors along an axis, in a plane or in space as on a lattice. What a particle takes beside them is
