@@ -12,9 +12,15 @@
 
 /* The library's own flags (implementation.c): -ffast-math lets the compiler reorder. */
 int reorders(void);
+/* Numbers on the way to a result have more digits than their type: x87. */
+#ifdef FLT_EVAL_METHOD
+#define MORE_DIGITS (FLT_EVAL_METHOD == 2)
+#else
+#define MORE_DIGITS 0
+#endif
 /* A tolerance for what depends on wave speeds. Their bounds are roots of differences that vanish where F is a rotation: to
    the last digit by one order of operations, to half of the digits by any other, or where more digits are kept. */
-#define BOUNDED(tolerance) (reorders() || FLT_EVAL_METHOD == 2 ? fmax((tolerance), 4 * sqrt(EPSILON)) : (tolerance))
+#define BOUNDED(tolerance) (reorders() || MORE_DIGITS ? fmax((tolerance), 4 * sqrt(EPSILON)) : (tolerance))
 
 /* Deterministic random numbers; any seed. */
 double random_between(uint64_t *state, double low, double high);
