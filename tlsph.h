@@ -4520,7 +4520,7 @@ static tlsph_real tlsphi_least_lane(const tlsph_real *lanes) {
     for (size_t l = 0; l < TLSPHI_LANES; l++) least = tlsphi_min(least, lanes[l]);
     return least;
 }
-/* Here and not in tlsphi_conclude_lanes: SSE2 compares no integers of 64 bits, and no vectors would be made of that. */
+/* Asked here and not in tlsphi_conclude_lanes: SSE2 compares no integers of 64 bits, and no vectors would be made of that. */
 static int tlsphi_is_possible(const tlsphi_state_lanes *x) {
     int good = 1;
     for (size_t l = 0; l < TLSPHI_LANES; l++)
@@ -5267,9 +5267,11 @@ TLSPHI_INLINE void tlsphi_store_slopes(const tlsph_solver *s, const tlsphi_block
     }
     tlsphi_finish_gradients(scale, M, dim, dim, sum->v);
     if (with_w) tlsphi_finish_gradients(scale, M, dim, dim, sum->w);
-    size_t apart;
-    tlsph_real *grad_v = s->keeps_rate ? tlsphi_grad_v(s, base, &apart) : NULL;
-    if (grad_v) tlsphi_store_lanes(dd, sum->v, first, last, apart, grad_v);
+    if (s->keeps_rate) {
+        size_t apart;
+        tlsph_real *grad_v = tlsphi_grad_v(s, base, &apart);
+        tlsphi_store_lanes(dd, sum->v, first, last, apart, grad_v);
+    }
     if (s->projection && !s->gathers_w) tlsphi_take_turn(s, s->body + block->body, base, first, last, dim, w);
     tlsphi_store_rows(dd, w, first, last, row + (size_t)s->rows.grad_w * TLSPHI_ROW);
     if (with_S) {
@@ -5534,7 +5536,6 @@ TLSPHI_INLINE void tlsphi_sum_sharp(const tlsph_solver *s, size_t tile, size_t b
     const tlsphi_graph *graph = &s->graph;
     const tlsphi_rows *r = &s->rows;
     const int dd = dim * dim;
-    const size_t *const all = tlsphi_columns[7];
     TLSPHI_ALIGNED tlsph_real a[27 * TLSPHI_LANES], X_a[3 * TLSPHI_LANES], d[3 * TLSPHI_LANES];
     TLSPHI_ALIGNED tlsph_real b_of[27 * TLSPHI_LANES], X_of[3 * TLSPHI_LANES]; /* collected */
     tlsphi_clear_lanes(dd, sum->moment);
@@ -5560,10 +5561,9 @@ TLSPHI_INLINE void tlsphi_sum_sharp(const tlsph_solver *s, size_t tile, size_t b
         TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
             TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++)
                 d[i * TLSPHI_LANES + l] = X_b[i * apart + l] - X_a[i * TLSPHI_LANES + l];
-        if (slot->axes == 1) tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[1], sum);
-        else if (slot->axes == 2) tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[2], sum);
-        else if (dim == 3 && slot->axes == 4) tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[4], sum);
-        else tlsphi_add_changes(a, b, apart, d, g, dim, dim, all, sum);
+        if (tlsphi_widths[slot->axes] == 1)
+            tlsphi_add_changes(a, b, apart, d, g, dim, 1, tlsphi_columns[slot->axes], sum);
+        else tlsphi_add_changes(a, b, apart, d, g, dim, dim, tlsphi_columns[7], sum);
     }
 }
 /* The same for the particles [begin, end) of a tile, pair by pair. */
@@ -5601,7 +5601,7 @@ static void tlsphi_mirror_lane(const tlsph_solver *s, size_t a, tlsph_real *sum)
     tlsphi_mirror_all(s, a, G);
     for (size_t i = 0; i < (size_t)(s->dim * s->dim); i++) at[i * TLSPHI_LANES] = G[i];
 }
-/* What becomes of the sums of the lanes [first, last). */
+/* What becomes of the sums of the lanes [first, last). dJ/dt = H : grad v; A is H, as without M (C_ab = -C_ba). */
 TLSPHI_INLINE void tlsphi_store_sharp(const tlsph_solver *s, size_t base, size_t first, size_t last, const int dim,
                                       tlsphi_sharp_sums *sum) {
     const tlsphi_rows *r = &s->rows;
@@ -6308,7 +6308,7 @@ static void tlsphi_flux_store(tlsph_solver *s, size_t a, const tlsphi_gathered *
     s->rate_E[a] = s->thermal == TLSPH_ENERGY ? s->rate_E[a] + rate : rate;
 }
 
-/* The same for a whole tile: the dissipation that is kept; that which is added; rates. */
+/* -- the same for a whole tile: what the integrator keeps of the dissipation and adds again, sums, rates -- */
 TLSPHI_INLINE void tlsphi_keep_lanes(const tlsph_solver *s, size_t base, const int dim,
                                      const tlsphi_lane_sums *damping) {
     const tlsph_real none[TLSPHI_LANES] = {0}, whole = s->leaps ? 0 : TLSPHI_R(1);
@@ -6343,6 +6343,8 @@ static void tlsphi_add_sums(const tlsphi_lane_sums *damping, tlsphi_lane_sums *s
         sum->production[l] += damping->production[l];
     }
 }
+/* Sums of a tile as the stage wants them: stresses and dissipation at once, or apart where the second is kept or has pairs
+   of its own. */
 TLSPHI_INLINE void tlsphi_flux_whole(const tlsph_solver *s, tlsphi_block *block, size_t tile, size_t base,
                                      const int dim, tlsphi_lane_sums *sum) {
     tlsphi_lane_sums damping;

@@ -136,7 +136,7 @@ static int by_address(const void *a, const void *b) {
 /* Of names for one array the last counts. */
 #define ARRAYS(EACH)                                                                                                  \
     EACH(materials) EACH(material_of) EACH(beside) EACH(block) EACH(body) EACH(host) EACH(inner) EACH(V) EACH(B_of)   \
-    EACH(B) EACH(tau) EACH(now_memory) EACH(old_memory) EACH(rate_p) EACH(row) EACH(rate_F) EACH(rate_J) \
+    EACH(B) EACH(tau) EACH(now_memory) EACH(old_memory) EACH(rate_p) EACH(row) EACH(rate_F) EACH(rate_J)              \
     EACH(rate_E) EACH(held) EACH(M_of) EACH(M) EACH(fix) EACH(mirror) EACH(mirror_of) EACH(load)                      \
     EACH(found) EACH(damped_first) EACH(first) EACH(damped_neighbour) EACH(neighbour) EACH(damped_g) EACH(g)          \
     EACH(image) EACH(graph.first) EACH(graph.slot) EACH(graph.gathered) EACH(graph.pattern)

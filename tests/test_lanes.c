@@ -53,14 +53,13 @@ static double compare_states(tlsph_solver *const solver[2])
 static double compare(moving_block s, double speed, int steps)
 {
     tlsph_solver *solver[2] = { NULL, NULL };
-    double worst = 0;
     for (int i = 0; i < 2; i++) {
         s.audit = i;
         if (!CHECK_RESULT(moving_block_create(&s, solver + i, NULL), TLSPH_OK)) return 0;
         CHECK_RESULT(moving_block_kick(solver[i], speed), TLSPH_OK);
         CHECK_RESULT(take_steps(solver[i], steps), TLSPH_OK);
     }
-    worst = compare_states(solver);
+    const double worst = compare_states(solver);
     for (int i = 0; i < 2; i++) tlsph_destroy(solver[i]);
     return worst;
 }
