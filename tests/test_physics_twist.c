@@ -116,7 +116,7 @@ TEST(slow_wide_column_is_smooth) {
     p.options.projection = 0;
     smooth = twist(&p).alternation;
     REPORT("alternation %.4f by default, %.4f wide", o.alternation, smooth);
-    CHECK(o.alternation > 0.06);
+    CHECK_BELOW(smooth, o.alternation / 2);
     CHECK_BELOW(smooth, 0.04);
 }
 
