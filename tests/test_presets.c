@@ -22,7 +22,8 @@ TEST(set_what_they_promise) {
         CHECK_SAME(lattice.operator_kind, i > 0 ? TLSPH_CELLS_4 : TLSPH_CELLS);
         CHECK_SAME(lattice.sharp_gradients, 0);
         CHECK_SAME(lattice.integrator, i == 0 ? TLSPH_LEAPFROG : i == 1 ? TLSPH_RK3_FROZEN : TLSPH_RK4_FROZEN);
-        CHECK_CLOSE(lattice.cfl, tlsph_cfl_limit(lattice.integrator), 0);
+        CHECK_CLOSE(lattice.cfl, i > 0 ? R(0.45) : tlsph_cfl_limit(lattice.integrator), 0);
+        CHECK_CLOSE(cloud.cfl, tlsph_cfl_limit(cloud.integrator), 0);
         CHECK_SAME(lattice.unknowns, TLSPH_PFJ);
         CHECK_SAME(cloud.operator_kind, TLSPH_CLOSED);
         CHECK_SAME(loose.operator_kind, TLSPH_CORRECTED_KERNEL);
