@@ -145,7 +145,10 @@ static void gradients(const book *k, particle *a) {
     }
 }
 
-#define FLOOR (real)(sizeof(real) == 8 ? 1e-6 : 3e-4) /* a raw jump below this share of the other counts as 0 */
+/* How much of a reconstructed jump the limiter lets through: product with the raw jump, square of itself. */
+static real share(real product, real square) {
+    return product > square ? 1 : product > 0 ? product / square : 0;
+}
 
 static void forces(const book *k, particle *a) {
     memset(a->force, 0, sizeof a->force);
@@ -153,7 +156,7 @@ static void forces(const book *k, particle *a) {
     for (int q = 0; q < a->count; q++) {
         const particle *b = &k->p[a->pairs[q].b];
         real C_ab[3], C_ba[3], C[3], c[3], n[3], d[3], Dv[3], Dr[3], t[3], PC_a[3], PC_b[3], c_a[3], c_b[3], Ga[3], Gb[3];
-        real CC, cc, normal, raw, S_J, DS, slope;
+        real CC, cc, normal, raw, along, across, S_J, DS, slope;
         vectors(a, b, &a->pairs[q], C_ab, C_ba);
         multiply(a->P, C_ab, PC_a); multiply(b->P, C_ba, PC_b);
         multiply(a->H, C_ab, c_a);  multiply(b->H, C_ba, c_b);
@@ -171,14 +174,13 @@ static void forces(const book *k, particle *a) {
         normal = dot(n, Dr, 3);
         raw = dot(n, Dv, 3);
         for (int i = 0; i < 3; i++) t[i] = Dr[i] - normal * n[i];
-        if (!(normal * raw > FLOOR * normal * normal)) normal = 0;
-        if (!(dot(t, Dv, 3) > FLOOR * dot(t, t, 3))) memset(t, 0, sizeof t);
-        for (int i = 0; i < 3; i++)
-            a->force[i] += k->rho * CC / 2 * ((a->c_p + b->c_p) / 2 * normal * n[i] + (a->c_s + b->c_s) / 2 * t[i]);
+        along = (a->c_p + b->c_p) / 2 * share(normal * raw, normal * normal) * normal;
+        across = (a->c_s + b->c_s) / 2 * share(dot(t, Dv, 3), dot(t, t, 3));
+        for (int i = 0; i < 3; i++) a->force[i] += k->rho * CC / 2 * (along * n[i] + across * t[i]);
         DS = b->S - a->S;
         slope = DS - (dot(a->grad_S, d, 3) + dot(b->grad_S, d, 3)) / 2;
         S_J = k->a_J * cc / (2 * k->rho * (a->c_p + b->c_p) / 2 * CC * (1 + (a->k + b->k) / 2));
-        if (DS * slope > FLOOR * slope * slope) a->D_J += S_J * slope;
+        a->D_J += S_J * share(DS * slope, slope * slope) * slope;
     }
 }
 
