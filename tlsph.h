@@ -1519,7 +1519,8 @@ typedef struct tlsphi_graph {
     size_t *first; /* slot of each tile; tiles in the order of the blocks */
     tlsphi_slot *slot;
     uint32_t *gathered;
-    int width;           /* D + 1; D + 2 with C_ab . d_ab, which compact conduction needs where C is not g */
+    int width;           /* D + 1; D + 2 with C_ab . d_ab, which compact conduction needs where C is not g; 2 D + 1 with */
+    int raw;             /* bonds, whose gradients take C_ab itself, from the row `raw` = D + 1 on; else raw = 0 */
     tlsph_real *pattern; /* width x lanes each */
 } tlsphi_graph;
 
@@ -2235,6 +2236,7 @@ static tlsph_result tlsphi_correct(tlsphi_plan *plan, size_t a, const double A[9
    Storage. None of these C_ab is M_a times an antisymmetric vector. The half difference g_ab = (C_ab - C_ba)/2 takes the
    place of the antisymmetric operator, and the half sum r_ab = (C_ab + C_ba)/2 is a second vector:
      P_a C_ab - P_b C_ba = (P_a + P_b) g_ab + (P_a - P_b) r_ab
+   The patterns of [TILES] hold g_ab and C_ab, for gradients; forces take r_ab = C_ab - g_ab in a gather of its own.
    The printed force is what remains without the second part, with g_ab of the kernel's gradient and not of the bonds; r_ab
    then is C_ab - g_ab and serves gradients only. */
 
@@ -5065,7 +5067,7 @@ TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t b
                                     const int with_more, const int dim, tlsph_real *out, tlsph_real *out_more) {
     const tlsphi_graph *graph = &s->graph;
     const tlsphi_slot *slot = graph->slot + graph->first[tile], *end = graph->slot + graph->first[tile + 1];
-    const size_t beside = (size_t)(more - row) * TLSPHI_ROW, *const all = tlsphi_columns[7];
+    const size_t beside = (size_t)(more - row) * TLSPHI_ROW, raw = (size_t)graph->raw, *const all = tlsphi_columns[7];
     TLSPHI_ALIGNED tlsph_real sum[9 * TLSPHI_LANES], sum_more[3 * TLSPHI_LANES];
     TLSPHI_ALIGNED tlsph_real a[3 * TLSPHI_LANES], a_more[TLSPHI_LANES], b[3 * TLSPHI_LANES], b_more[TLSPHI_LANES];
     tlsphi_clear_lanes(rows * dim, sum);
@@ -5074,7 +5076,7 @@ TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t b
     if (with_more) tlsphi_take_tile(tlsphi_at(s, more, base), 0, 1, a_more);
     while (slot < end) {
         for (; slot < end && slot->scattered; slot++) {
-            const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+            const tlsph_real *g = graph->pattern + ((size_t)slot->pattern * (size_t)graph->width + raw) * TLSPHI_LANES;
             const tlsph_real *at[TLSPHI_LANES];
             TLSPHI_LANE_BY_LANE for (size_t l = 0; l < TLSPHI_LANES; l++)
                 at[l] = tlsphi_at(s, row, graph->gathered[slot->from + l]);
@@ -5084,7 +5086,7 @@ TLSPHI_INLINE void tlsphi_sum_jumps(const tlsph_solver *s, size_t tile, size_t b
             if (with_more) tlsphi_add_jumps(a_more, b_more, TLSPHI_LANES, g, dim, dim, all, 1, sum_more);
         }
         for (; slot < end && !slot->scattered; slot++) {
-            const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+            const tlsph_real *g = graph->pattern + ((size_t)slot->pattern * (size_t)graph->width + raw) * TLSPHI_LANES;
             const tlsph_real *there = tlsphi_at(s, row, slot->from);
 #define TLSPHI_ADD_JUMPS(width, columns)                                                                               \
     do {                                                                                                               \
@@ -5300,38 +5302,6 @@ TLSPHI_INLINE void tlsphi_gradient_tile(const tlsph_solver *s, const tlsphi_bloc
     tlsphi_store_slopes(s, block, begin, end, dim, with_w, with_S, with_theta, &sum);
 }
 
-/* The part of r_ab ([BONDS]): a gather of its own, so that other operators have no branch in theirs. */
-static void tlsphi_gradient_rest(const tlsph_solver *s, size_t a) {
-    const int dim = s->dim;
-    const size_t D = (size_t)dim, dd = D * D;
-    const tlsph_real half = 1 / (2 * s->V[a]);
-    const tlsphi_rows *r = &s->rows;
-    tlsph_real G[9] = {0}, Gw[9] = {0}, PM[9];
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const size_t b = s->neighbour[k];
-        const tlsph_real *w_a = tlsphi_at(s, r->w, a), *w_b = tlsphi_at(s, r->w, b);
-        tlsph_real rest[3], Dv[3], Dw[3];
-        for (size_t i = 0; i < D; i++) {
-            rest[i] = s->rest[D * k + i] * half;
-            Dv[i] = tlsphi_v(s, b, i) - tlsphi_v(s, a, i);
-            Dw[i] = w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW];
-            if (s->has_J)
-                tlsphi_at(s, r->slope_S, a)[i * TLSPHI_ROW] += (*tlsphi_at(s, r->S, b) - *tlsphi_at(s, r->S, a)) * rest[i];
-            if (s->conducts)
-                tlsphi_at(s, r->slope_theta, a)[i * TLSPHI_ROW] +=
-                    (*tlsphi_at(s, r->theta, b) - *tlsphi_at(s, r->theta, a)) * rest[i];
-        }
-        tlsphi_add_outer(dim, G, Dv, rest);
-        tlsphi_add_outer(dim, Gw, Dw, rest);
-    }
-    tlsphi_row_get(s, r->PM, (int)dd, a, PM);
-    if (s->rate_E) s->rate_E[a] += tlsphi_dot(dim * dim, PM, Gw);
-    size_t apart;
-    tlsph_real *grad_v = tlsphi_grad_v(s, a, &apart);
-    for (size_t i = 0; i < dd; i++) grad_v[i * apart] += G[i];
-    for (size_t i = 0; i < dd; i++) tlsphi_at(s, r->grad_w, a)[i * TLSPHI_ROW] += Gw[i];
-}
-
 /* The slope of Sigma_J or, heat, of theta. */
 static void tlsphi_mirror_slope(tlsph_solver *s, int row, int heat, size_t a) {
     tlsph_real slope[3];
@@ -5481,20 +5451,19 @@ static void tlsphi_gradient_block(tlsph_solver *s, tlsphi_block *block) {
         if (s->dim == 3) tlsphi_gradient_tile(s, block, tile, a, end, 3, with_w, with_S, with_theta);
         else tlsphi_gradient_tile(s, block, tile, a, end, 2, with_w, with_S, with_theta);
     }
-    if (!s->rest && !s->mirrors && !s->images && !s->held_parts && !s->turns) return;
+    if (!s->mirrors && !s->images && !s->held_parts && !s->turns) return;
     tlsphi_held_part *held = tlsphi_find_held_part(s, block->begin), *const parts = s->held_part + s->held_parts;
     for (size_t a = block->begin; a < block->end; a++) {
         const int mirrored = tlsphi_mirrors_of(s, a) != NULL, imaged = image != last && image->particle == a;
-        if (s->rest) tlsphi_gradient_rest(s, a);
         for (; image != last && image->particle == a; image++) tlsphi_image_gradient(s, image);
         tlsphi_held_part *const from = held;
         while (held != parts && held->particle == a) held++;
         if (held != from) tlsphi_hold_gradient(s, from, held);
         if (mirrored) tlsphi_mirror_gradients(s, a);
         if (s->turns) tlsphi_turn_gradient(s, s->body[block->body].spin, a);
-        if (s->rate_J && !s->sharp && (s->rest || imaged || mirrored || held != from || s->turns))
+        if (s->rate_J && !s->sharp && (imaged || mirrored || held != from || s->turns))
             tlsphi_jacobian_rate(s, s->body + block->body, a);
-        if (with_theta && (s->rest || mirrored)) tlsphi_heat_flux(s, a); /* their gradients are not the raw sums */
+        if (with_theta && mirrored) tlsphi_heat_flux(s, a); /* the gradient is not the raw sum */
     }
 }
 
@@ -5718,7 +5687,7 @@ static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
    flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
    is conserved to round-off because force and gradient are adjoint. The physics of a pair is written once, for two sides
    that were loaded from the rows, and stands in two loops: over the lanes of a tile, and over the pairs of a particle
-   (printed and JST dissipation, bonds, metals; with `audit` all, which is how tests compare the two). */
+   (printed and JST dissipation, bonds that conduct heat, metals; with `audit` all, which is how tests compare the two). */
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
 typedef struct tlsphi_gathered {
@@ -6205,6 +6174,29 @@ static void tlsphi_adjoint_block(tlsph_solver *s, tlsphi_block *block) {
         else tlsphi_adjoint_tile(s, block, tile, a, end, 2);
     }
 }
+/* (P_a - P_b) r_ab/2 of a tile ([BONDS]): a gather of its own, so that other operators have no branch in theirs. */
+TLSPHI_INLINE void tlsphi_add_rests(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
+                                    const int dim, tlsph_real *T) {
+    const tlsphi_graph *graph = &s->graph;
+    const tlsphi_rows r = tlsphi_rows_of(dim, 0, 1, 1, 0);
+    const size_t D = (size_t)dim;
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const tlsphi_slot *slot = graph->slot + k;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+        const tlsph_real *raw = g + (size_t)graph->raw * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, r.P, r.P + dim * dim), *a = tlsphi_at(s, 0, base);
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+            TLSPHI_UNROLL for (size_t i = 0; i < D; i++) {
+                tlsph_real sum = 0;
+                TLSPHI_UNROLL for (size_t j = 0; j < D; j++) {
+                    const size_t at = ((size_t)r.P + D * i + j) * TLSPHI_ROW + l, m = j * TLSPHI_LANES + l;
+                    sum += (a[at] - b[at]) * (raw[m] - g[m]);
+                }
+                T[i * TLSPHI_LANES + l] += sum / 2;
+            }
+        }
+    }
+}
 static int tlsphi_any_front(const tlsphi_lane_sums *sum) {
     int any = 0;
     for (size_t l = 0; l < TLSPHI_LANES; l++) any |= sum->approach[l] < 0;
@@ -6222,6 +6214,9 @@ static void tlsphi_flux_tile(const tlsph_solver *s, tlsphi_block *block, size_t 
     for (int i = 0; i < 3; i++) tlsphi_clear_lanes(1, scalars[i]);
     tlsphi_clear_damping(sum);
     if (rest) tlsphi_add_slots(s, block, tile, base, 0, rest, sum);
+    const int split = (parts & TLSPHI_STRESSES) && s->bonds && s->force_form == TLSPH_ADJOINT;
+    if (split && s->dim == 3) tlsphi_add_rests(s, block, tile, base, 3, sum->T);
+    else if (split) tlsphi_add_rests(s, block, tile, base, 2, sum->T);
     if (known || (limited && tlsphi_any_front(sum))) {
         tlsphi_clear_damping(sum);
         tlsphi_add_slots(s, block, tile, base, 1, TLSPHI_DAMPING, sum);
@@ -9471,10 +9466,11 @@ typedef struct tlsphi_tiler {
     uint32_t *list;           /* lanes x most */
     double *g;                /* lanes x most x D */
     tlsph_real *size, *along; /* lanes x most: |C_ab|, C_ab . d_ab */
+    tlsph_real *raw;          /* lanes x most x D, with bonds: C_ab itself */
     uint8_t *done, *axes;     /* lanes x most; axes: as in tlsphi_slot */
     size_t slot_room, gather_room;
     tlsphi_patterns patterns;
-    tlsph_real pattern[5 * TLSPHI_LANES];
+    tlsph_real pattern[7 * TLSPHI_LANES];
     unsigned slot_axes;
 } tlsphi_tiler;
 
@@ -9581,8 +9577,11 @@ static int tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         t->along[lane * t->most + i] = (tlsph_real)(along * plan->h);
         for (size_t k = 0; k < D && plan->antisymmetric; k++) g[D * i + k] = C[k];
         t->axes[lane * t->most + i] = 0;
-        for (size_t k = 0; k < D; k++)
-            if (d[k] != 0 || (tlsph_real)g[D * i + k] != 0) t->axes[lane * t->most + i] |= (uint8_t)(1u << k);
+        for (size_t k = 0; k < D; k++) {
+            if (t->raw) t->raw[D * (lane * t->most + i) + k] = (tlsph_real)mine[k];
+            if (d[k] != 0 || (tlsph_real)g[D * i + k] != 0 || (t->raw && (tlsph_real)mine[k] != 0))
+                t->axes[lane * t->most + i] |= (uint8_t)(1u << k);
+        }
     }
     t->count[lane] = count;
     if (t->damped) return 1;
@@ -9595,7 +9594,9 @@ static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
     t->slot_axes |= t->axes[at];
     for (size_t k = 0; k < D; k++) t->pattern[k * TLSPHI_LANES + lane] = (tlsph_real)t->g[D * at + k];
     t->pattern[D * TLSPHI_LANES + lane] = t->size[at];
-    if (t->graph->width == t->plan->dim + 2) t->pattern[(D + 1) * TLSPHI_LANES + lane] = t->along[at];
+    if (t->raw)
+        for (size_t k = 0; k < D; k++) t->pattern[(D + 1 + k) * TLSPHI_LANES + lane] = t->raw[D * at + k];
+    else if (t->graph->width == t->plan->dim + 2) t->pattern[(D + 1) * TLSPHI_LANES + lane] = t->along[at];
 }
 /* Closes a slot: the pattern is set; `from` is the first neighbour, or, scattered, the place of the list. */
 static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
@@ -9675,18 +9676,20 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->damped = damped;
     t->graph = plan->graph + damped;
     const int compact = plan->desc->thermal && plan->desc->conduction == TLSPH_COMPACT;
-    t->graph->width = plan->dim + (compact && !plan->antisymmetric ? 2 : 1);
+    t->graph->width = plan->dim + (plan->bond ? plan->dim + 1 : compact && !plan->antisymmetric ? 2 : 1);
+    t->graph->raw = plan->bond ? plan->dim + 1 : 0;
     t->most = plan->most;
     t->list = TLSPHI_SCRATCH(plan, uint32_t, all);
     t->g = TLSPHI_SCRATCH(plan, double, D * all);
     t->size = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->along = TLSPHI_SCRATCH(plan, tlsph_real, all);
+    if (plan->bond) t->raw = TLSPHI_SCRATCH(plan, tlsph_real, D * all);
     t->done = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->axes = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->patterns.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     for (size_t a = 0; a < n; a++) t->graph->tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
     t->graph->first = TLSPHI_SCRATCH(plan, size_t, t->graph->tiles + 1);
-    if (!t->list || !t->g || !t->size || !t->along || !t->done || !t->axes || !t->patterns.seen || !t->graph->first)
+    if (!t->list || !t->g || !t->size || !t->along || (plan->bond && !t->raw) || !t->done || !t->axes || !t->patterns.seen || !t->graph->first)
         return tlsphi_no_memory(plan, 64.0 * (double)all);
     for (size_t tile = 0; t->end < n; tile++) {
         t->begin = t->end;
@@ -9911,7 +9914,8 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->rows.lap_p = s->rows.count;
         s->rows.count += s->dim;
     }
-    s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !s->bonds && !s->audit && !s->metal;
+    s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !(s->bonds && s->conducts) &&
+               !s->audit && !s->metal;
     s->heat_moves = s->conducts;
     s->keeps_pairs = d->keep_pairs || !s->lanes || s->incompressible || d->particles.moments ||
                      s->step_rule != TLSPH_STEP_BY_PARTICLE;
@@ -10042,7 +10046,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->damped_neighbour = apart ? TLSPHI_TAKE(arena, uint32_t, plan->damped_pairs) : s->neighbour;
     s->damped_g = apart ? TLSPHI_TAKE(arena, tlsph_real, D * plan->damped_pairs) : s->g;
     s->image = TLSPHI_TAKE(arena, tlsphi_image, s->images);
-    if (s->bonds) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
+    if (s->bonds && s->keeps_pairs) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
     if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
     tlsphi_layout_graph(arena, plan->graph, &s->graph);
     if (s->super.most && s->conduction == TLSPH_COMPACT && !s->bonds)

@@ -233,6 +233,8 @@ static tlsph_desc moving_block_desc(const moving_block *s, const own_cloud *clou
     if (s->jitter > 0) desc.support = R(0.9);
     desc.sharp_gradients = s->sharp;
     if (s->sharp) desc.operator_kind = TLSPH_CELLS;
+    if (s->kind) desc.operator_kind = s->kind;
+    desc.force_form = s->force_form;
     return desc;
 }
 

@@ -42,6 +42,7 @@ static tlsph_solver *make(const sample *q, own_cloud *cloud) {
     desc.dissipation = q->dissipation;
     desc.projection = q->projection;
     desc.threads = 1;
+    desc.keep_pairs = 1;
     if (!CHECK_RESULT(tlsph_create(&desc, &solver, &error), TLSPH_OK)) printf("    %s\n", error.message);
     return solver;
 }

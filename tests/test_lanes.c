@@ -217,6 +217,20 @@ TEST(sharp_gradients_of_J)
     REPORT(" %.1e, half the step: %.1e", drift[0], drift[1]);
     CHECK_BELOW(drift[1], fmax(0.3 * drift[0], 20 * EPSILON));
 }
+/* Operators whose C_ab are no M_a times an antisymmetric vector, with both forms of the force. */
+TEST(bonds)
+{
+    static const tlsph_operator_kind kinds[] = { TLSPH_ZEROTH_KERNEL, TLSPH_FIRST_KERNEL, TLSPH_ZEROTH_BOND, TLSPH_BOND };
+    for (int i = 0; i < 8; i++) {
+        moving_block s = body(2 + i % 2, i < 4 ? 0 : 0.1);
+        s.kind = kinds[i / 2];
+        s.jitter = i % 3 ? 0.1 : 0.001; /* support 0.9 either way */
+        s.force_form = i == 5 ? TLSPH_FORCE_AS_PRINTED : TLSPH_ADJOINT;
+        s.integrator = i == 6 ? TLSPH_LEAPFROG : i == 7 ? TLSPH_RK3_FROZEN : TLSPH_RK2;
+        compare_all(s, 0.5);
+    }
+}
+
 TEST(other_dissipations)
 {
     static const tlsph_dissipation kinds[] = { TLSPH_RECONSTRUCTED, TLSPH_FIRST_ORDER, TLSPH_NO_DISSIPATION,
@@ -295,5 +309,5 @@ TEST(temperatures_of_round_off)
 
 SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(mirrors), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
       ENTRY(leapfrog), ENTRY(frozen_dissipation), ENTRY(sharp_gradients),
-      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(other_dissipations),
+      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(bonds), ENTRY(other_dissipations),
       ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
