@@ -5687,7 +5687,8 @@ static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
    flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
    is conserved to round-off because force and gradient are adjoint. The physics of a pair is written once, for two sides
    that were loaded from the rows, and stands in two loops: over the lanes of a tile, and over the pairs of a particle
-   (printed and JST dissipation, bonds that conduct heat, metals; with `audit` all, which is how tests compare the two). */
+   (printed and JST dissipation, bonds that conduct heat, metals with any but the default dissipation; with `audit` all,
+   which is how tests compare the two). */
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
 typedef struct tlsphi_gathered {
@@ -5762,7 +5763,8 @@ TLSPHI_INLINE void tlsphi_pair_dissipate(const tlsphi_damp_side *a, const tlsphi
         Dr[i] = Dv[i] - Dr[i];
     }
     const tlsph_real cc = tlsphi_dot(dim, c, c), inverse = tlsphi_inverse_or_0(cc);
-    const tlsph_real rho = (a->rho + b->rho) / 2, share = metal ? tlsphi_square_root(cc) / (2 * CC) : TLSPHI_R(0.5);
+    const tlsph_real rho = (a->rho + b->rho) / 2, half = TLSPHI_R(0.5);
+    const tlsph_real share = metal ? half * tlsphi_square_root(cc) * tlsphi_inverse_or_0(CC) : half;
     const tlsph_real c_p = (a->c_p + b->c_p) * share, c_s = (a->c_s + b->c_s) * share;
     const tlsph_real raw = tlsphi_dot(dim, c, Dv), low = TLSPHI_R(TLSPHI_FRONT_LOW) * c_p;
     out->approach = raw * tlsphi_abs(raw) + low * low * cc;
@@ -6017,10 +6019,11 @@ TLSPHI_INLINE void tlsphi_heat_lanes(const tlsphi_rows *r, const tlsph_real *a, 
         sum->conduction[l] += heat.conduction;
     }
 }
-/* Adds the dissipation of a slot. */
+/* Adds the dissipation of a slot, with a look for fronts or that of metals. */
+enum { TLSPHI_PLAIN, TLSPHI_FRONTS, TLSPHI_METALS };
 TLSPHI_INLINE void tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
                                      const tlsph_real *pattern, const int dim, const int width, const size_t *columns,
-                                     const int with_J, const int kind, const int with_front, tlsph_real jump_share,
+                                     const int with_J, const int kind, const int mode, tlsph_real jump_share,
                                      tlsphi_lane_sums *sum) {
     TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
         tlsphi_damp_side side_a, side_b;
@@ -6030,7 +6033,7 @@ TLSPHI_INLINE void tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, 
         tlsphi_load_side(r, b + l, TLSPHI_ROW, dim, width, columns, with_J, &side_b);
         tlsphi_take_components(width, columns, pattern + l, TLSPHI_LANES, g);
         tlsphi_pair_dissipate(&side_a, &side_b, g, pattern[(size_t)dim * TLSPHI_LANES + l], dim, width, with_J,
-                              with_front, kind, 0, jump_share, &flux);
+                              mode == TLSPHI_FRONTS, kind, mode == TLSPHI_METALS, jump_share, &flux);
         TLSPHI_UNROLL for (int i = 0; i < dim; i++) sum->damped[(size_t)i * TLSPHI_LANES + l] += flux.D_p[i];
         if (with_J) sum->J[l] += flux.D_J;
         sum->production[l] += flux.production;
@@ -6066,13 +6069,13 @@ TLSPHI_INLINE void tlsphi_heat_slot(const tlsph_solver *s, const tlsphi_rows *r,
     else tlsphi_heat_lanes(r, a, b, g, dim, dim, all, s->thermal, 1, 0, sum);
 }
 TLSPHI_INLINE void tlsphi_limited_slot(const tlsphi_rows *r, const tlsph_real *a, const tlsph_real *b,
-                                       const tlsph_real *g, const int dim, int axes, const int with_J, const int fronts,
+                                       const tlsph_real *g, const int dim, int axes, const int with_J, const int mode,
                                        tlsph_real share, tlsphi_lane_sums *sum) {
     const size_t *const columns = tlsphi_columns[axes], *const all = tlsphi_columns[7];
     const int width = tlsphi_widths[axes];
-    if (width == 1) tlsphi_damp_lanes(r, a, b, g, dim, 1, columns, with_J, TLSPH_LIMITED, fronts, share, sum);
-    else if (width < dim) tlsphi_damp_lanes(r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, fronts, share, sum);
-    else tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, fronts, share, sum);
+    if (width == 1) tlsphi_damp_lanes(r, a, b, g, dim, 1, columns, with_J, TLSPH_LIMITED, mode, share, sum);
+    else if (width < dim) tlsphi_damp_lanes(r, a, b, g, dim, 2, columns, with_J, TLSPH_LIMITED, mode, share, sum);
+    else tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_LIMITED, mode, share, sum);
 }
 TLSPHI_INLINE void tlsphi_damp_slot(const tlsph_solver *s, const tlsphi_rows *r, const tlsph_real *a,
                                     const tlsph_real *b, const tlsph_real *g, const int dim, int axes,
@@ -6086,14 +6089,14 @@ TLSPHI_INLINE void tlsphi_damp_slot(const tlsph_solver *s, const tlsphi_rows *r,
         tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_RECONSTRUCTED, 0, share, sum);
     else tlsphi_damp_lanes(r, a, b, g, dim, dim, all, with_J, TLSPH_SELF_ADJOINT, 0, share, sum);
 }
-/* fronts: the dissipation with a look for fronts, and nothing else. */
+/* mode: with a look for fronts, or of metals, the default dissipation and nothing else. */
 TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
-                                     const int dim, const int with_J, const int fronts, int parts,
+                                     const int dim, const int with_J, const int mode, int parts,
                                      tlsphi_lane_sums *sum) {
     const tlsphi_graph *graph = parts == TLSPHI_DAMPING ? &s->damped_graph : &s->graph;
     const tlsphi_rows r = tlsphi_rows_of(dim, with_J, 1, 1, 0); /* constants; those that differ in a scene are not used */
     TLSPHI_ALIGNED tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
-    const int stresses = !fronts && (parts & TLSPHI_STRESSES), heats = s->heat_moves && stresses;
+    const int stresses = mode == TLSPHI_PLAIN && (parts & TLSPHI_STRESSES), heats = s->heat_moves && stresses;
     const int rows = heats ? r.count : with_J ? r.theta : r.S;
     const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
     const int thin = (!damps || s->dissipation == TLSPH_LIMITED) && (!heats || (s->conduction == TLSPH_COMPACT && !s->M));
@@ -6110,23 +6113,25 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
         tlsph_real masked[4 * TLSPHI_LANES];
         if (damps && block->seen) g = tlsphi_mask_slot(s, graph, slot, base, dim, g, masked);
         if (!damps) continue;
-        if (fronts) tlsphi_limited_slot(&r, a, b, g, dim, slot->axes, with_J, 1, s->jump_share, sum);
+        if (mode) tlsphi_limited_slot(&r, a, b, g, dim, slot->axes, with_J, mode, s->jump_share, sum);
         else tlsphi_damp_slot(s, &r, a, b, g, dim, slot->axes, with_J, sum);
     }
 }
-#define TLSPHI_FLUX_SLOTS(dim, J, fronts)                                                                              \
-    static void tlsphi_flux_slots_##dim##J##fronts(const tlsph_solver *s, const tlsphi_block *block, size_t tile,      \
-                                                   size_t base, int parts, tlsphi_lane_sums *sum) {                    \
-        tlsphi_flux_slots(s, block, tile, base, dim, J, fronts, parts, sum);                                           \
+#define TLSPHI_FLUX_SLOTS(dim, J, mode)                                                                                \
+    static void tlsphi_flux_slots_##dim##J##mode(const tlsph_solver *s, const tlsphi_block *block, size_t tile,        \
+                                                   size_t base, int parts, tlsphi_lane_sums *sum) {                      \
+        tlsphi_flux_slots(s, block, tile, base, dim, J, mode, parts, sum);                                             \
     }
-#define TLSPHI_EACH_FLUX(X) X(2, 0, 0) X(2, 0, 1) X(2, 1, 0) X(2, 1, 1) X(3, 0, 0) X(3, 0, 1) X(3, 1, 0) X(3, 1, 1)
+#define TLSPHI_EACH_FLUX(X)                                                                                            \
+    X(2, 0, 0) X(2, 0, 1) X(2, 0, 2) X(2, 1, 0) X(2, 1, 1) X(2, 1, 2)                                                  \
+    X(3, 0, 0) X(3, 0, 1) X(3, 0, 2) X(3, 1, 0) X(3, 1, 1) X(3, 1, 2)
 TLSPHI_EACH_FLUX(TLSPHI_FLUX_SLOTS)
-#define TLSPHI_CASE(dim, J, fronts)                                                                                    \
-    case 4 * (dim == 3) + 2 * J + fronts: tlsphi_flux_slots_##dim##J##fronts(s, block, tile, base, parts, sum); break;
+#define TLSPHI_CASE(dim, J, mode)                                                                                      \
+    case 6 * (dim == 3) + 3 * J + mode: tlsphi_flux_slots_##dim##J##mode(s, block, tile, base, parts, sum); break;
 
-static void tlsphi_add_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int fronts,
+static void tlsphi_add_slots(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base, int mode,
                              int parts, tlsphi_lane_sums *sum) {
-    switch ((s->dim == 3 ? 4 : 0) + (s->has_J ? 2 : 0) + fronts) {
+    switch ((s->dim == 3 ? 6 : 0) + (s->has_J ? 3 : 0) + mode) {
         TLSPHI_EACH_FLUX(TLSPHI_CASE)
     default: break;
     }
@@ -6148,7 +6153,9 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
         tlsphi_lane_sums flux;
         tlsphi_clear_damping(&flux);
         if (slot->scattered) tlsphi_gather(s, block, graph, slot, r.A, r.S);
-        tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, 0, 0, &flux);
+        if (s->metal)
+            tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, TLSPHI_METALS, 0, &flux);
+        else tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, TLSPHI_PLAIN, 0, &flux);
         for (size_t j = 0; j < D; j++) {
             const tlsph_real *X_a = a + ((size_t)r.X + j) * TLSPHI_LANES, *X_b = b + ((size_t)r.X + j) * TLSPHI_ROW;
             for (size_t i = 0; i < D; i++)
@@ -6207,19 +6214,20 @@ static int tlsphi_any_front(const tlsphi_lane_sums *sum) {
 static void tlsphi_flux_tile(const tlsph_solver *s, tlsphi_block *block, size_t tile, size_t base, int parts,
                              tlsphi_lane_sums *sum) {
     const uint32_t bit = (uint32_t)1 << (tile - block->tile);
-    const int limited = s->dissipation == TLSPH_LIMITED && (parts & TLSPHI_DAMPING);
-    const int known = limited && (block->fronts & bit), rest = known ? parts & ~TLSPHI_DAMPING : parts;
+    const int limited = s->dissipation == TLSPH_LIMITED && (parts & TLSPHI_DAMPING), metal = limited && s->metal;
+    const int known = limited && !metal && (block->fronts & bit), rest = known || metal ? parts & ~TLSPHI_DAMPING : parts;
     tlsph_real *const scalars[3] = {sum->heat, sum->source, sum->conduction};
     tlsphi_clear_lanes(3, sum->T);
     for (int i = 0; i < 3; i++) tlsphi_clear_lanes(1, scalars[i]);
     tlsphi_clear_damping(sum);
-    if (rest) tlsphi_add_slots(s, block, tile, base, 0, rest, sum);
+    if (rest) tlsphi_add_slots(s, block, tile, base, TLSPHI_PLAIN, rest, sum);
+    if (metal) tlsphi_add_slots(s, block, tile, base, TLSPHI_METALS, TLSPHI_DAMPING, sum);
     const int split = (parts & TLSPHI_STRESSES) && s->bonds && s->force_form == TLSPH_ADJOINT;
     if (split && s->dim == 3) tlsphi_add_rests(s, block, tile, base, 3, sum->T);
     else if (split) tlsphi_add_rests(s, block, tile, base, 2, sum->T);
-    if (known || (limited && tlsphi_any_front(sum))) {
+    if (known || (limited && !metal && tlsphi_any_front(sum))) {
         tlsphi_clear_damping(sum);
-        tlsphi_add_slots(s, block, tile, base, 1, TLSPHI_DAMPING, sum);
+        tlsphi_add_slots(s, block, tile, base, TLSPHI_FRONTS, TLSPHI_DAMPING, sum);
         block->fronts = tlsphi_any_front(sum) ? block->fronts | bit : block->fronts & ~bit;
     }
     for (size_t i = 0; i < 3 * TLSPHI_LANES; i++) sum->T[i] += sum->damped[i];
@@ -9915,7 +9923,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->rows.count += s->dim;
     }
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !(s->bonds && s->conducts) &&
-               !s->audit && !s->metal;
+               !s->audit && (!s->metal || s->dissipation == TLSPH_LIMITED || s->dissipation == TLSPH_NO_DISSIPATION);
     s->heat_moves = s->conducts;
     s->keeps_pairs = d->keep_pairs || !s->lanes || s->incompressible || d->particles.moments ||
                      s->step_rule != TLSPH_STEP_BY_PARTICLE;

@@ -231,6 +231,22 @@ TEST(bonds)
     }
 }
 
+/* Von Mises, whose dissipation takes other speeds. */
+TEST(metals)
+{
+    double worst = 0;
+    for (int i = 0; i < 12; i++) {
+        moving_block s = body(2 + i % 2, i < 6 ? 0 : 0.1);
+        s.material = TLSPH_VON_MISES;
+        s.unknowns = i % 4 < 2 ? TLSPH_PF : TLSPH_PFHJ;
+        s.thermal = sizeof(tlsph_real) == 4 ? TLSPH_ISOTHERMAL : (tlsph_thermal)(i % 3);
+        const double one = compare(s, 0.5, 3);
+        if (!CHECK(one < tolerance())) printf("    case %d: %.1e\n", i, one);
+        worst = fmax(worst, one);
+    }
+    REPORT(" %.1e", worst);
+}
+
 TEST(other_dissipations)
 {
     static const tlsph_dissipation kinds[] = { TLSPH_RECONSTRUCTED, TLSPH_FIRST_ORDER, TLSPH_NO_DISSIPATION,
@@ -309,5 +325,5 @@ TEST(temperatures_of_round_off)
 
 SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(mirrors), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
       ENTRY(leapfrog), ENTRY(frozen_dissipation), ENTRY(sharp_gradients),
-      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(bonds), ENTRY(other_dissipations),
+      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(bonds), ENTRY(metals), ENTRY(other_dissipations),
       ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
