@@ -3389,53 +3389,97 @@ static const tlsphi_plastic tlsphi_virgin = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, 0, 0};
 TLSPHI_INLINE tlsph_real tlsphi_plastic_work(const tlsphi_material *m, tlsph_real strain) {
     return strain * (m->yield + m->hardening * strain / 2);
 }
-/* out = ln(I + X) or exp X for a symmetric X without trace. Near 0 by the power series, whose powers stay in the span of I,
-   X and X^2 (Cayley-Hamilton: X^3 = tr X^2/2 X + det X I); else from the eigenvalues, which Jacobi rotations find without
-   ever dividing by a difference of them. In double also for float: a yield strain is a few thousandths. */
-static void tlsphi_symmetric_function(int exponential, const double X[9], double out[9]) {
-    double XX[9], part[3] = {exponential ? 1.0 : 0.0, 0, 0}, power[3] = {0, 1, 0}, factor = 1;
-    for (int i = 0; i < 9; i++) XX[i] = X[i / 3 * 3] * X[i % 3] + X[i / 3 * 3 + 1] * X[3 + i % 3] + X[i / 3 * 3 + 2] * X[6 + i % 3];
-    const double square = (XX[0] + XX[4] + XX[8]) / 2;
-    if (square > 0.03 * 0.03) {
-        double D[9], Q[9];
-        for (int i = 0; i < 9; i++) D[i] = X[i] + (exponential || i % 4 ? 0 : 1);
-        tlsphi_eigen(D, Q);
-        for (int i = 0; i < 9; i++) out[i] = 0;
-        for (int k = 0; k < 3; k++) {
-            const double value = exponential ? exp(D[4 * k]) : log(D[4 * k]);
-            for (int i = 0; i < 9; i++) out[i] += value * Q[i / 3 * 3 + k] * Q[i % 3 * 3 + k];
-        }
-        return;
-    }
-    const double third = X[0] * (X[4] * X[8] - X[5] * X[7]) + X[1] * (X[5] * X[6] - X[3] * X[8]) +
-                         X[2] * (X[3] * X[7] - X[4] * X[6]);
-    for (int k = 1; k <= 12; k++) { /* 0.05^13 is below round-off */
-        const double weight = exponential ? factor /= k : (k % 2 ? 1.0 : -1.0) / k;
-        for (int i = 0; i < 3; i++) part[i] += weight * power[i];
-        const double next[3] = {third * power[2], power[0] + square * power[2], power[1]};
-        for (int i = 0; i < 3; i++) power[i] = next[i];
-    }
-    for (int i = 0; i < 9; i++) out[i] = (i % 4 ? 0 : part[0]) + part[1] * X[i] + part[2] * XX[i];
+/* Symmetric tensors here are their entries 11, 22, 33, 12, 13, 23, in double also for float: a yield strain is a few
+   thousandths. All nine: */
+static void tlsphi_symmetric_expand(const double S[6], double out[9]) {
+    static const int slot[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};
+    for (int i = 0; i < 9; i++) out[i] = S[slot[i]];
 }
-/* Deviator e of the logarithmic elastic strain ln(b)/2; returns sqrt(3/2 tau':tau') = 2 mu sqrt(3/2 e:e). */
-static double tlsphi_elastic_strain(const tlsphi_material *m, const tlsph_real *F, const tlsph_real *C, double e[9]) {
-    double b[9], FC[9], square = 0;
-    for (int i = 0; i < 9; i++) {
-        const int row = i / 3 * 3, column = i % 3;
-        FC[i] = (double)F[row] * (double)C[column] + (double)F[row + 1] * (double)C[3 + column] +
-                (double)F[row + 2] * (double)C[6 + column];
+/* X : X/2 of a symmetric tensor. */
+TLSPHI_INLINE double tlsphi_half_square(const double X[6]) {
+    return (X[0] * X[0] + X[1] * X[1] + X[2] * X[2]) / 2 + X[3] * X[3] + X[4] * X[4] + X[5] * X[5];
+}
+/* a I + b X + c X^2, of which `part` holds a, b, c, times X, plus `add` I. */
+TLSPHI_INLINE void tlsphi_times_and_add(double square, double third, double add, double part[3]) {
+    const double linear = part[0] + square * part[2];
+    part[0] = third * part[2] + add;
+    part[2] = part[1];
+    part[1] = linear;
+}
+/* out = ln(I + X) or exp X - I for a small symmetric X without trace, by twelve terms of the power series. Its powers stay
+   in the span of I, X and X^2 (Cayley-Hamilton: X^3 = tr X^2/2 X + det X I), so that Horner's scheme takes three numbers. */
+#define TLSPHI_SMALL 0.03 /* largest (X : X/2)^(1/2): 0.05^13 is below round-off */
+TLSPHI_INLINE void tlsphi_power_series(const int exponential, const double X[6], double out[6]) {
+    static const double logarithm[12] = {1, -1. / 2, 1. / 3, -1. / 4, 1. / 5, -1. / 6, 1. / 7, -1. / 8, 1. / 9, -1. / 10,
+                                         1. / 11, -1. / 12};
+    static const double exponential_of[12] = {1, 1. / 2, 1. / 6, 1. / 24, 1. / 120, 1. / 720, 1. / 5040, 1. / 40320,
+                                              1. / 362880, 1. / 3628800, 1. / 39916800, 1. / 479001600};
+    const double *weight = exponential ? exponential_of : logarithm, square = tlsphi_half_square(X);
+    const double XX[6] = {X[0] * X[0] + X[3] * X[3] + X[4] * X[4], X[3] * X[3] + X[1] * X[1] + X[5] * X[5],
+                          X[4] * X[4] + X[5] * X[5] + X[2] * X[2], X[0] * X[3] + X[3] * X[1] + X[4] * X[5],
+                          X[0] * X[4] + X[3] * X[5] + X[4] * X[2], X[3] * X[4] + X[1] * X[5] + X[5] * X[2]};
+    const double third = X[0] * (X[1] * X[2] - X[5] * X[5]) + X[3] * (X[5] * X[4] - X[3] * X[2]) +
+                         X[4] * (X[3] * X[5] - X[1] * X[4]);
+    double part[3] = {0, 0, 0}; /* of I, X and X^2 */
+    TLSPHI_UNROLL for (int k = 12; k > 6; k--) tlsphi_times_and_add(square, third, weight[k - 1], part); /* two loops, as */
+    TLSPHI_UNROLL for (int k = 6; k > 0; k--) tlsphi_times_and_add(square, third, weight[k - 1], part); /* 9 are unrolled */
+    tlsphi_times_and_add(square, third, 0, part);
+    TLSPHI_UNROLL for (int i = 0; i < 6; i++) out[i] = (i < 3 ? part[0] : 0) + part[1] * X[i] + part[2] * XX[i];
+}
+/* The same for any X, from its eigenvalues, which Jacobi rotations find without ever dividing by a difference of them. */
+static void tlsphi_spectral_function(int exponential, const double X[6], double out[6]) {
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    double D[9], Q[9];
+    tlsphi_symmetric_expand(X, D);
+    for (int i = 0; i < 9 && !exponential; i += 4) D[i] += 1;
+    tlsphi_eigen(D, Q);
+    for (int i = 0; i < 6; i++) out[i] = 0;
+    for (int k = 0; k < 3; k++) {
+        const double value = exponential ? exp(D[4 * k]) - 1 : log(D[4 * k]);
+        for (int i = 0; i < 6; i++) out[i] += value * Q[3 * row[i] + k] * Q[3 * column[i] + k];
     }
-    for (int i = 0; i < 9; i++) {
-        const int row = i / 3 * 3, other = i % 3 * 3;
-        b[i] = FC[row] * (double)F[other] + FC[row + 1] * (double)F[other + 1] + FC[row + 2] * (double)F[other + 2];
+}
+static void tlsphi_symmetric_function(int exponential, const double X[6], double out[6]) {
+    if (tlsphi_half_square(X) > TLSPHI_SMALL * TLSPHI_SMALL) tlsphi_spectral_function(exponential, X, out);
+    else if (exponential) tlsphi_power_series(1, X, out);
+    else tlsphi_power_series(0, X, out);
+}
+
+/* Deviator e of the logarithmic elastic strain ln(b)/2 and (3/2 e:e)^(1/2), so that tau = 2 mu size. */
+typedef struct tlsphi_elastic {
+    double e[6], size;
+} tlsphi_elastic;
+/* X = b/(tr b/3) - I of b = F C_p^-1 F^T. */
+TLSPHI_INLINE void tlsphi_elastic_left(const double F[9], const double C[6], double X[6]) {
+    double FC[9], b[6];
+    TLSPHI_UNROLL for (int i = 0; i < 9; i += 3) {
+        FC[i] = F[i] * C[0] + F[i + 1] * C[3] + F[i + 2] * C[4];
+        FC[i + 1] = F[i] * C[3] + F[i + 1] * C[1] + F[i + 2] * C[5];
+        FC[i + 2] = F[i] * C[4] + F[i + 1] * C[5] + F[i + 2] * C[2];
     }
-    const double mean = (b[0] + b[4] + b[8]) / 3;
-    for (int i = 0; i < 9; i++) b[i] = b[i] / mean - (i % 4 ? 0 : 1);
-    tlsphi_symmetric_function(0, b, e);
-    const double third = (e[0] + e[4] + e[8]) / 3;
-    for (int i = 0; i < 9; i++) e[i] = (e[i] - (i % 4 ? 0 : third)) / 2;
-    for (int i = 0; i < 9; i++) square += e[i] * e[i];
-    return 2 * (double)m->mu * sqrt(1.5 * square);
+    TLSPHI_UNROLL for (int i = 0; i < 3; i++)
+        b[i] = FC[3 * i] * F[3 * i] + FC[3 * i + 1] * F[3 * i + 1] + FC[3 * i + 2] * F[3 * i + 2];
+    b[3] = FC[0] * F[3] + FC[1] * F[4] + FC[2] * F[5];
+    b[4] = FC[0] * F[6] + FC[1] * F[7] + FC[2] * F[8];
+    b[5] = FC[3] * F[6] + FC[4] * F[7] + FC[5] * F[8];
+    const double per_mean = 3 / (b[0] + b[1] + b[2]);
+    TLSPHI_UNROLL for (int i = 0; i < 6; i++) X[i] = b[i] * per_mean - (i < 3 ? 1 : 0);
+}
+/* e from ln b; square = 3/2 e:e. */
+TLSPHI_INLINE void tlsphi_elastic_deviator(double e[6], double *square) {
+    const double third = (e[0] + e[1] + e[2]) / 3;
+    TLSPHI_UNROLL for (int i = 0; i < 6; i++) e[i] = (e[i] - (i < 3 ? third : 0)) / 2;
+    *square = 3 * tlsphi_half_square(e);
+}
+static void tlsphi_elastic_strain(const tlsph_real *F, const tlsphi_plastic *plastic, tlsphi_elastic *out) {
+    static const int slot[6] = {0, 4, 8, 1, 2, 5};
+    double F_d[9], C[6], X[6], square;
+    for (int i = 0; i < 9; i++) F_d[i] = (double)F[i];
+    for (int i = 0; i < 6; i++) C[i] = (double)plastic->C[slot[i]];
+    tlsphi_elastic_left(F_d, C, X);
+    tlsphi_symmetric_function(0, X, out->e);
+    tlsphi_elastic_deviator(out->e, &square);
+    out->size = sqrt(square);
 }
 
 /* The elastic response. Bound of the acoustic tensor: with the current normal n = F^-T N, m the direction of motion and
@@ -3443,10 +3487,11 @@ static double tlsphi_elastic_strain(const tlsphi_material *m, const tlsph_real *
    f = x coth x <= 1 + x^2/3, x <= tau/(sqrt 3 mu) the largest difference of the elastic log strains, is what finite
    strains add to the moduli, and g <= 4/3 tau what the stress itself does; |n|^2 is at most L_H/J^2. */
 static void tlsphi_respond_von_mises(const tlsphi_material *m, const tlsph_real *F, tlsph_real d, tlsph_real J,
-                                     int coupled, const tlsphi_plastic *plastic, tlsph_response *out) {
+                                     int coupled, const tlsphi_elastic *elastic, tlsph_response *out) {
     double e[9];
     tlsph_real tensor[9], H[9];
-    const tlsph_real tau = (tlsph_real)tlsphi_elastic_strain(m, F, plastic->C, e);
+    const tlsph_real tau = (tlsph_real)(2 * (double)m->mu * elastic->size);
+    tlsphi_symmetric_expand(elastic->e, e);
     const tlsph_real log_J = tlsphi_log(J), pull = m->beta * m->theta_R;
     for (int i = 0; i < 9; i++) tensor[i] = (tlsph_real)(2 * (double)(m->mu / d) * e[i]);
     tlsph_cofactor(F, H);
@@ -3466,18 +3511,20 @@ static void tlsphi_respond_von_mises(const tlsphi_material *m, const tlsph_real 
 }
 
 /* Lets C_p^-1 and the plastic strain flow until F is admissible. Returns 1 if it had to. */
-static int tlsphi_return_map(const tlsphi_material *m, const tlsph_real *F, tlsph_real d, tlsphi_plastic *plastic) {
-    double e[9], b[9];
-    const double tau = tlsphi_elastic_strain(m, F, plastic->C, e);
+static int tlsphi_return_map(const tlsphi_material *m, const tlsph_real *F, tlsph_real d, const tlsphi_elastic *elastic,
+                             tlsphi_plastic *plastic) {
+    double twice_e[6], exponential[6], b[9];
+    const double tau = 2 * (double)m->mu * elastic->size;
     const double excess = tau - (double)(m->yield + m->hardening * plastic->strain);
     if (!(excess > 0) || !(tau < TLSPHI_LARGEST)) return 0;
     const double flow = excess / (3 * (double)m->mu + (double)m->hardening);
     const double keep = 1 - 3 * (double)m->mu * flow / tau, root = (double)tlsphi_inverse_cube_root(d);
     const double scale = root * root * root * root; /* b has the volume of F: J^2/3, and 1/J^2 for both F^-1 = H^T/J */
     tlsph_real H[9], bH[9], left[9];
-    for (int i = 0; i < 9; i++) e[i] *= 2 * keep;
-    tlsphi_symmetric_function(1, e, b);
-    for (int i = 0; i < 9; i++) left[i] = (tlsph_real)(scale * b[i]);
+    for (int i = 0; i < 6; i++) twice_e[i] = 2 * keep * elastic->e[i];
+    tlsphi_symmetric_function(1, twice_e, exponential);
+    tlsphi_symmetric_expand(exponential, b);
+    for (int i = 0; i < 9; i++) left[i] = (tlsph_real)(scale * (b[i] + (i % 4 ? 0 : 1)));
     tlsph_cofactor(F, H);
     tlsphi_product(3, left, H, bH);
     for (int i = 0; i < 9; i++)
@@ -3573,7 +3620,9 @@ TLSPHI_DEF tlsph_result tlsph_material_evaluate(const tlsph_material *material, 
         const uint32_t particle = 0;
         m.response(m.user, 1, &particle, F, &d, &r);
     } else if (m.kind == TLSPH_VON_MISES) {
-        tlsphi_respond_von_mises(&m, F, d, d, coupled, &tlsphi_virgin, &r);
+        tlsphi_elastic elastic;
+        tlsphi_elastic_strain(F, &tlsphi_virgin, &elastic);
+        tlsphi_respond_von_mises(&m, F, d, d, coupled, &elastic, &r);
     } else {
         tlsphi_respond(&m, F, H, d, d, coupled, &r, &dev);
     }
@@ -4085,10 +4134,15 @@ static tlsph_real tlsphi_temperature(const tlsph_solver *s, const tlsphi_state *
     return m->theta_R;
 }
 
-/* Sets F, H, J, response: all that does not need the temperature. `user`: response of a user's material, if evaluated
-   already. Returns TLSPH_OK, NOT_FINITE or INVERSION. */
+/* What a tile has had evaluated at once: the response of a user's material, the elastic strain of a metal. */
+typedef struct tlsphi_known {
+    const tlsph_response *response;
+    const tlsphi_elastic *elastic;
+} tlsphi_known;
+/* Sets F, H, J, response: all that does not need the temperature. known may be NULL. Returns TLSPH_OK, NOT_FINITE or
+   INVERSION. */
 static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state *u, size_t a,
-                                      const tlsph_response *user, tlsphi_point *pt) {
+                                      const tlsphi_known *known, tlsphi_point *pt) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const int dim = s->dim, joint = s->coupling == TLSPH_JOINT_AS_PRINTED;
     tlsphi_load_measures(s, u, m, a, pt);
@@ -4096,13 +4150,15 @@ static tlsph_result tlsphi_respond_at(const tlsph_solver *s, const tlsphi_state 
     if (!tlsphi_finite(pt->d) || !tlsphi_finite(pt->J)) return TLSPH_ERROR_NOT_FINITE;
     if (m->kind != TLSPH_LINEAR && (!(pt->d > 0) || !(pt->J > 0))) return TLSPH_ERROR_INVERSION;
     if (m->kind == TLSPH_USER) {
-        if (user) pt->r = *user;
+        if (known) pt->r = *known->response;
         else m->response(m->user, 1, s->host + a, pt->F, &pt->J, &pt->r);
         memset(&pt->dev, 0, sizeof pt->dev);
     } else if (m->kind == TLSPH_VON_MISES) {
         const size_t reals = tlsphi_plastic_reals(dim, s->thermal);
+        tlsphi_elastic elastic;
         tlsphi_load_plastic(dim, s->thermal, u->plastic + reals * a, &pt->plastic);
-        tlsphi_respond_von_mises(m, pt->F, pt->d, pt->J, s->thermal, &pt->plastic, &pt->r);
+        if (!known) tlsphi_elastic_strain(pt->F, &pt->plastic, &elastic);
+        tlsphi_respond_von_mises(m, pt->F, pt->d, pt->J, s->thermal, known ? known->elastic : &elastic, &pt->r);
         if (s->thermal) pt->r.energy += (1 - m->heating) * tlsphi_plastic_work(m, pt->plastic.strain);
         memset(&pt->dev, 0, sizeof pt->dev);
     } else if (s->has_H && !joint && m->mooney) {
@@ -4131,9 +4187,9 @@ TLSPHI_INLINE void tlsphi_conclude(const tlsphi_material *m, tlsph_real theta, t
 }
 /* Everything at a particle. */
 static tlsph_result tlsphi_constitute(const tlsph_solver *s, const tlsphi_state *u, size_t a,
-                                      const tlsph_response *user, tlsphi_point *pt) {
+                                      const tlsphi_known *known, tlsphi_point *pt) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
-    const tlsph_result result = tlsphi_respond_at(s, u, a, user, pt);
+    const tlsph_result result = tlsphi_respond_at(s, u, a, known, pt);
     if (result) return result;
     const tlsph_real theta = pt->theta = tlsphi_temperature(s, u, m, a, pt);
     if (!tlsphi_finite(theta)) return TLSPH_ERROR_NOT_FINITE;
@@ -4241,8 +4297,41 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
         *tlsphi_at(s, r->h_J, a) = m->kind == TLSPH_LINEAR ? m->h : m->h / pt->J;
 }
 
+/* Elastic strains of the particles [begin, end) of a tile, by lanes where they are small, as they are in most metals. */
+static void tlsphi_elastic_strains(const tlsph_solver *s, const tlsph_real *plastic, size_t begin, size_t end,
+                                   tlsphi_elastic *out) {
+    static const int slot[6] = {0, 4, 8, 1, 2, 5};
+    const size_t reals = tlsphi_plastic_reals(s->dim, s->thermal), count = end - begin;
+    tlsph_real F[TLSPHI_LANES][9];
+    tlsphi_plastic at[TLSPHI_LANES];
+    TLSPHI_ALIGNED double F_of[9 * TLSPHI_LANES] = {0}, C_of[6 * TLSPHI_LANES] = {0}, e_of[6 * TLSPHI_LANES];
+    TLSPHI_ALIGNED double strain[TLSPHI_LANES], square[TLSPHI_LANES]; /* X : X/2 and 3/2 e:e */
+    for (size_t l = 0; l < count; l++) {
+        tlsphi_tensor_expand(s->now.F, s->dim, begin + l, 1, F[l]);
+        tlsphi_load_plastic(s->dim, s->thermal, plastic + reals * (begin + l), at + l);
+        for (size_t i = 0; i < 9; i++) F_of[i * TLSPHI_LANES + l] = (double)F[l][i];
+        for (size_t i = 0; i < 6; i++) C_of[i * TLSPHI_LANES + l] = (double)at[l].C[slot[i]];
+    }
+    for (size_t l = count; l < TLSPHI_LANES; l++) /* no particle: F = C = I */
+        for (size_t i = 0; i < 3; i++) F_of[4 * i * TLSPHI_LANES + l] = C_of[i * TLSPHI_LANES + l] = 1;
+    TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+        double F_d[9], C[6], X[6], e[6];
+        TLSPHI_UNROLL for (size_t i = 0; i < 9; i++) F_d[i] = F_of[i * TLSPHI_LANES + l];
+        TLSPHI_UNROLL for (size_t i = 0; i < 6; i++) C[i] = C_of[i * TLSPHI_LANES + l];
+        tlsphi_elastic_left(F_d, C, X);
+        strain[l] = tlsphi_half_square(X);
+        tlsphi_power_series(0, X, e);
+        tlsphi_elastic_deviator(e, square + l);
+        TLSPHI_UNROLL for (size_t i = 0; i < 6; i++) e_of[i * TLSPHI_LANES + l] = e[i];
+    }
+    for (size_t l = 0; l < count; l++) {
+        for (size_t i = 0; i < 6; i++) out[l].e[i] = e_of[i * TLSPHI_LANES + l];
+        out[l].size = sqrt(square[l]);
+        if (strain[l] > TLSPHI_SMALL * TLSPHI_SMALL) tlsphi_elastic_strain(F[l], at + l, out + l);
+    }
+}
 /* Plastic flow of one particle since the beginning of the step. Returns 1 if there was any. */
-static int tlsphi_flow(tlsph_solver *s, size_t a) {
+static int tlsphi_flow(tlsph_solver *s, size_t a, const tlsphi_elastic *elastic) {
     const tlsphi_material *m = tlsphi_material_of(s, a);
     const size_t reals = tlsphi_plastic_reals(s->dim, s->thermal);
     tlsphi_plastic plastic;
@@ -4251,7 +4340,7 @@ static int tlsphi_flow(tlsph_solver *s, size_t a) {
     tlsphi_tensor_expand(s->now.F, s->dim, a, 1, F);
     tlsphi_load_plastic(s->dim, s->thermal, s->old.plastic + reals * a, &plastic);
     const tlsph_real d = tlsph_determinant(F);
-    const int flows = d > 0 && tlsphi_finite(d) && tlsphi_return_map(m, F, d, &plastic);
+    const int flows = d > 0 && tlsphi_finite(d) && tlsphi_return_map(m, F, d, elastic, &plastic);
     tlsphi_store_plastic(s->dim, s->thermal, &plastic, s->now.plastic + reals * a);
     return flows;
 }
@@ -4270,15 +4359,20 @@ static void tlsphi_heat_of_flow(tlsph_solver *s, size_t a) {
     tlsphi_store_plastic(s->dim, s->thermal, &pt.plastic, s->now.plastic + reals * a);
 }
 static void tlsphi_flow_block(tlsph_solver *s, tlsphi_block *block) {
-    for (size_t a = block->begin; a < block->end; a++)
-        if (tlsphi_flow(s, a) && s->thermal) tlsphi_heat_of_flow(s, a);
+    tlsphi_elastic elastic[TLSPHI_LANES];
+    for (size_t begin = block->begin, end; begin < block->end; begin = end) {
+        end = tlsphi_tile_end(block, begin);
+        tlsphi_elastic_strains(s, s->old.plastic, begin, end, elastic);
+        for (size_t a = begin; a < end; a++)
+            if (tlsphi_flow(s, a, elastic + (a - begin)) && s->thermal) tlsphi_heat_of_flow(s, a);
+    }
 }
 
 /* One particle in full. Returns 0 if its state is impossible. */
-static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t a, const tlsph_response *user) {
+static int tlsphi_evaluate_particle(tlsph_solver *s, tlsphi_block *block, size_t a, const tlsphi_known *known) {
     tlsphi_point pt;
     double heat;
-    const tlsph_result result = tlsphi_constitute(s, &s->now, a, user, &pt);
+    const tlsph_result result = tlsphi_constitute(s, &s->now, a, known, &pt);
     if (result) {
         block->failed = (uint32_t)a;
         block->failure = result;
@@ -4593,9 +4687,13 @@ TLSPHI_INLINE int tlsphi_publish_tile(tlsph_solver *s, tlsphi_block *block, cons
 /* The particles [begin, end), one by one. */
 static int tlsphi_evaluate_particles(tlsph_solver *s, tlsphi_block *block, size_t begin, size_t end) {
     tlsph_response user[TLSPHI_LANES];
+    tlsphi_elastic elastic[TLSPHI_LANES];
     if (s->has_user) tlsphi_user_responses(s, begin, end, user);
-    for (size_t a = begin; a < end; a++)
-        if (!tlsphi_evaluate_particle(s, block, a, user + (a - begin))) return 0;
+    if (s->now.plastic) tlsphi_elastic_strains(s, s->now.plastic, begin, end, elastic);
+    for (size_t a = begin; a < end; a++) {
+        const tlsphi_known known = {user + (a - begin), elastic + (a - begin)};
+        if (!tlsphi_evaluate_particle(s, block, a, &known)) return 0;
+    }
     return 1;
 }
 /* How many tiles from `begin` on go by lanes together. */
@@ -8960,7 +9058,11 @@ TLSPHI_DEF tlsph_result tlsph_write(tlsph_solver *s, tlsph_field field, const tl
     tlsphi_keep_state(s);
     for (size_t a = 0; a < s->n; a++) tlsphi_write_particle(s, a, field, in + components * s->host[a]);
     if (field == TLSPH_FIELD_VELOCITY) tlsphi_apply_fixes(s, s->now.p, 0, s->n);
-    for (size_t a = 0; s->now.plastic && field == TLSPH_FIELD_F && a < s->n; a++) tlsphi_flow(s, a);
+    for (size_t a = 0; s->now.plastic && field == TLSPH_FIELD_F && a < s->n; a++) {
+        tlsphi_elastic elastic;
+        tlsphi_elastic_strains(s, s->old.plastic, a, a + 1, &elastic);
+        tlsphi_flow(s, a, &elastic);
+    }
     for (size_t a = 0; s->thermal && a < s->n; a++)
         tlsphi_set_temperature(s, a, theta ? theta[s->host[a]] : (*tlsphi_theta(s, a)));
     const tlsphi_block *bad = tlsphi_evaluate(s);
