@@ -1519,8 +1519,9 @@ typedef struct tlsphi_graph {
     size_t *first; /* slot of each tile; tiles in the order of the blocks */
     tlsphi_slot *slot;
     uint32_t *gathered;
-    int width;           /* D + 1; D + 2 with C_ab . d_ab, which compact conduction needs where C is not g; 2 D + 1 with */
-    int raw;             /* bonds, whose gradients take C_ab itself, from the row `raw` = D + 1 on; else raw = 0 */
+    int width, along;    /* D + 1; along: with C_ab . d_ab, which compact conduction needs where C is not g; 2 D + 1 with */
+    int raw;             /* bonds, whose gradients take C_ab itself, from the row `raw` = D + 1 on; else raw = 0; */
+    int laplacian;       /* with TLSPH_JST one more, the row of l_ab; else 0 */
     tlsph_real *pattern; /* width x lanes each */
 } tlsphi_graph;
 
@@ -1566,7 +1567,7 @@ typedef struct tlsphi_plan {
     uint8_t *fixed;          /* number of constrained directions of each particle (solver order), */
     double *fixed_direction; /* and these directions, orthonormal, dim x dim each */
     size_t fixes, mirrors, held_parts; /* how many in all (see [CONDITIONS], [SURFACES]) */
-    tlsphi_scratch scratch[64];
+    tlsphi_scratch scratch[96]; /* the richest operators take 66 */
     int scratches;
 } tlsphi_plan;
 
@@ -3864,7 +3865,7 @@ struct tlsph_solver {
     int lanes;               /* fluxes by lanes, see [FLUXES] */
     tlsphi_graph graph, damped_graph; /* the second with TLSPH_CELLS_4 */
     tlsph_real *least_stretch;        /* [PAIR-STEP] */
-    tlsph_real *laplacian, *lean;     /* [JST]: l_ab a pair, 2 vectors a particle */
+    tlsph_real *laplacian, *lean;     /* [JST]: l_ab a pair, with keeps_pairs; 2 vectors a particle */
     tlsph_real *held; /* dissipation that outlasts its pass, see tlsphi_keep_damping */
     /* conditions */
     tlsphi_fix *fix;
@@ -5747,16 +5748,28 @@ static tlsph_real tlsphi_pair_laplacian(const tlsph_solver *s, size_t a, size_t 
     tlsphi_pair_arm(s, a, b, dim, d);
     return tlsphi_max(tlsphi_dot(dim, C, d), 0) / tlsphi_dot(dim, d, d);
 }
-/* sum_c l_ac d_ac / (2 V_a^2), turned so that its product with g_ab is that with C_ab; r_ab goes with rest. */
-static void tlsphi_laplacian_lean(const tlsph_solver *s, size_t a, tlsph_real lean[3], tlsph_real turned[3]) {
-    const size_t D = (size_t)s->dim;
+/* Number of the neighbour that a lane of a slot holds. */
+TLSPHI_INLINE size_t tlsphi_slot_neighbour(const tlsphi_graph *graph, const tlsphi_slot *slot, size_t lane) {
+    return slot->scattered ? graph->gathered[slot->from + lane] : slot->from + lane;
+}
+/* sum_c l_ac d_ac / (2 V_a^2), turned so that its product with g_ab is that with C_ab; r_ab goes with rest. Returns the sum
+   of l_ac. */
+static tlsph_real tlsphi_laplacian_lean(const tlsph_solver *s, size_t tile, size_t a, tlsph_real lean[3],
+                                        tlsph_real turned[3]) {
+    const tlsphi_graph *graph = &s->graph;
+    const size_t D = (size_t)s->dim, lane = a % TLSPHI_LANES;
+    tlsph_real sum = 0;
     lean[0] = lean[1] = lean[2] = 0;
-    for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
-        const size_t b = s->neighbour[k];
-        const tlsph_real l = s->laplacian[k] / (2 * s->V[a] * s->V[a]);
-        for (size_t i = 0; i < D; i++) lean[i] += l * (tlsphi_X(s, b, i) - tlsphi_X(s, a, i));
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const size_t row = (size_t)graph->slot[k].pattern * (size_t)graph->width + (size_t)graph->laplacian;
+        const tlsph_real l = graph->pattern[row * TLSPHI_LANES + lane];
+        if (!(l > 0)) continue; /* nor may a lane without a pair read a particle that is not there */
+        const size_t b = tlsphi_slot_neighbour(graph, graph->slot + k, lane);
+        for (size_t i = 0; i < D; i++) lean[i] += l / (2 * s->V[a] * s->V[a]) * (tlsphi_X(s, b, i) - tlsphi_X(s, a, i));
+        sum += l;
     }
     tlsphi_correct_transposed(s, a, s->dim, lean, turned);
+    return sum;
 }
 /* rho w of b less that of a */
 TLSPHI_INLINE void tlsphi_momentum_jump(const tlsph_solver *s, size_t a, size_t b, const int dim, tlsph_real *jump) {
@@ -5765,9 +5778,10 @@ TLSPHI_INLINE void tlsphi_momentum_jump(const tlsph_solver *s, size_t a, size_t 
     TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++)
         jump[i] = rho_b * w_b[i * TLSPHI_ROW] - rho_a * w_a[i * TLSPHI_ROW];
 }
-static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
+/* L of the particles [begin, end) of a tile, one by one and by lanes; there all are of one material. */
+static void tlsphi_laplacian_particles(const tlsph_solver *s, size_t begin, size_t end) {
     const size_t D = (size_t)s->dim;
-    for (size_t a = block->begin; a < block->end; a++) {
+    for (size_t a = begin; a < end; a++) {
         const tlsph_real *lean = s->lean + 2 * D * a;
         tlsph_real sum[3] = {0, 0, 0}, jump[3];
         for (size_t k = s->first[a]; k < s->first[a + 1]; k++) {
@@ -5780,13 +5794,47 @@ static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
         tlsphi_row_put(s, s->rows.lap_p, s->dim, a, sum);
     }
 }
+TLSPHI_INLINE void tlsphi_laplacian_tile(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t begin,
+                                         size_t end, const int dim) {
+    const tlsphi_graph *graph = &s->graph;
+    const size_t D = (size_t)dim, base = begin / TLSPHI_LANES * TLSPHI_LANES, raw = (size_t)graph->raw * TLSPHI_LANES;
+    const tlsph_real rho = s->materials->rho, *a = tlsphi_at(s, s->rows.w, base);
+    TLSPHI_ALIGNED tlsph_real lean[6 * TLSPHI_LANES], sum[3 * TLSPHI_LANES] = {0}, scale[TLSPHI_LANES];
+    tlsphi_half_per_volume(s, base, begin - base, end - base, scale);
+    tlsphi_take_lanes(s->lean + 2 * D * base, 2 * D, begin - base, end - base, lean);
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const tlsphi_slot *slot = graph->slot + k;
+        const tlsph_real *g = graph->pattern + (size_t)slot->pattern * (size_t)graph->width * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, s->rows.w, s->rows.w + dim) +
+                              (size_t)s->rows.w * TLSPHI_ROW;
+        const tlsph_real *l_ab = g + (size_t)graph->laplacian * TLSPHI_LANES;
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+            tlsph_real L = 2 * l_ab[l] * scale[l];
+            TLSPHI_UNROLL for (size_t i = 0; i < D; i++) {
+                const size_t at = i * TLSPHI_LANES + l;
+                L -= lean[at] * g[at] + (raw ? lean[D * TLSPHI_LANES + at] * (g[raw + at] - g[at]) : 0);
+            }
+            TLSPHI_UNROLL for (size_t i = 0; i < D; i++)
+                sum[i * TLSPHI_LANES + l] += L * rho * (b[i * TLSPHI_ROW + l] - a[i * TLSPHI_ROW + l]);
+        }
+    }
+    tlsphi_store_rows(dim, sum, begin - base, end - base, tlsphi_at(s, s->rows.lap_p, base));
+}
+static void tlsphi_laplacian_block(tlsph_solver *s, tlsphi_block *block) {
+    for (size_t begin = block->begin, tile = block->tile, end; begin < block->end; begin = end, tile++) {
+        end = tlsphi_tile_end(block, begin);
+        if (!s->lanes) tlsphi_laplacian_particles(s, begin, end);
+        else if (s->dim == 3) tlsphi_laplacian_tile(s, block, tile, begin, end, 3);
+        else tlsphi_laplacian_tile(s, block, tile, begin, end, 2);
+    }
+}
 /* ==== [FLUXES] =====================================================================================================
    One gather over the neighbours: stress, numerical dissipation and heat. The power of the stresses needs no pairs: the
    flux form (54e) is P_a : grad v_a + v_a . T_a/V_a identically, so E follows from the rates of F and p, and the total
    is conserved to round-off because force and gradient are adjoint. The physics of a pair is written once, for two sides
    that were loaded from the rows, and stands in two loops: over the lanes of a tile, and over the pairs of a particle
-   (printed and JST dissipation, bonds that conduct heat, metals with any but the default dissipation; with `audit` all,
-   which is how tests compare the two). */
+   (the printed dissipation, JST with several materials, bonds that conduct heat, metals with other reconstructions; with
+   `audit` all, which is how tests compare the two). */
 
 /* T_a, D_J, heat (E form: J/s; eta form: heat conduction/theta only), and what the ledger wants to know. */
 typedef struct tlsphi_gathered {
@@ -5833,18 +5881,26 @@ TLSPHI_INLINE void tlsphi_load_heat(const tlsphi_rows *r, const tlsph_real *at, 
 typedef struct tlsphi_damping {
     tlsph_real D_p[3], D_J, production, approach;
 } tlsphi_damping;
-/* (002-28) for one pair. */
+/* (002-28) for one pair: lc = l_ab c; jumps of rho w, of its Laplacian and of w. */
+TLSPHI_INLINE void tlsphi_jst_flux(const int dim, tlsph_real lc, tlsph_real eta2, tlsph_real eta4, const tlsph_real *jump,
+                                   const tlsph_real *lap, const tlsph_real *Dw, tlsphi_damping *out) {
+    out->production = 0;
+    TLSPHI_UNROLL for (int i = 0; i < dim; i++) {
+        out->D_p[i] = lc * (eta2 * jump[i] - eta4 * lap[i]);
+        out->production += Dw[i] * out->D_p[i];
+    }
+}
 TLSPHI_INLINE void tlsphi_pair_jst(const tlsph_solver *s, size_t a, size_t b, size_t k, int dim, tlsphi_damping *out) {
     const tlsph_real c = (tlsphi_material_of(s, a)->c_linear + tlsphi_material_of(s, b)->c_linear) / 2;
-    const tlsph_real l = s->laplacian[k] * c, eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
     const tlsph_real *lap_a = tlsphi_at(s, s->rows.lap_p, a), *lap_b = tlsphi_at(s, s->rows.lap_p, b);
     const tlsph_real *w_a = tlsphi_at(s, s->rows.w, a), *w_b = tlsphi_at(s, s->rows.w, b);
-    tlsph_real jump[3];
+    tlsph_real jump[3], lap[3], Dw[3];
     tlsphi_momentum_jump(s, a, b, dim, jump);
     TLSPHI_UNROLL for (size_t i = 0; i < (size_t)dim; i++) {
-        out->D_p[i] = l * (eta2 * jump[i] - eta4 * (lap_b[i * TLSPHI_ROW] - lap_a[i * TLSPHI_ROW]));
-        out->production += (w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW]) * out->D_p[i];
+        lap[i] = lap_b[i * TLSPHI_ROW] - lap_a[i * TLSPHI_ROW];
+        Dw[i] = w_b[i * TLSPHI_ROW] - w_a[i * TLSPHI_ROW];
     }
+    tlsphi_jst_flux(dim, s->laplacian[k] * c, TLSPHI_R(s->harmonic), TLSPHI_R(s->biharmonic), jump, lap, Dw, out);
 }
 /* Default forms for one pair: g and |C| of the pair. dim, width, with_J, with_front, kind are constants after inlining.
    Without with_front the fluxes are those away from fronts; `approach` tells whether that must be looked at again. */
@@ -6196,7 +6252,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
     TLSPHI_ALIGNED tlsph_real a[TLSPHI_ROWS_MOST * TLSPHI_LANES];
     const int stresses = mode == TLSPHI_PLAIN && (parts & TLSPHI_STRESSES), heats = s->heat_moves && stresses;
     const int rows = heats ? r.count : with_J ? r.theta : r.S;
-    const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION;
+    const int damps = (parts & TLSPHI_DAMPING) && s->dissipation != TLSPH_NO_DISSIPATION && s->dissipation != TLSPH_JST;
     const int thin = (!damps || s->dissipation == TLSPH_LIMITED) && (!heats || (s->conduction == TLSPH_COMPACT && !s->M));
     tlsphi_take_tile(tlsphi_at(s, 0, base), r.w, rows, a);
     for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
@@ -6251,9 +6307,7 @@ TLSPHI_INLINE void tlsphi_adjoint_tile(const tlsph_solver *s, const tlsphi_block
         tlsphi_lane_sums flux;
         tlsphi_clear_damping(&flux);
         if (slot->scattered) tlsphi_gather(s, block, graph, slot, r.A, r.S);
-        if (s->metal)
-            tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, TLSPHI_METALS, 0, &flux);
-        else tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, TLSPHI_PLAIN, 0, &flux);
+        tlsphi_damp_lanes(&r, a, b, g, dim, dim, tlsphi_columns[7], 0, TLSPH_SELF_ADJOINT, TLSPHI_PLAIN, 0, &flux);
         for (size_t j = 0; j < D; j++) {
             const tlsph_real *X_a = a + ((size_t)r.X + j) * TLSPHI_LANES, *X_b = b + ((size_t)r.X + j) * TLSPHI_ROW;
             for (size_t i = 0; i < D; i++)
@@ -6302,6 +6356,33 @@ TLSPHI_INLINE void tlsphi_add_rests(const tlsph_solver *s, const tlsphi_block *b
         }
     }
 }
+/* The dissipation of TLSPH_JST of a tile. */
+TLSPHI_INLINE void tlsphi_add_jst(const tlsph_solver *s, const tlsphi_block *block, size_t tile, size_t base,
+                                  const int dim, tlsphi_lane_sums *sum) {
+    const tlsphi_graph *graph = &s->graph;
+    const size_t D = (size_t)dim, w = (size_t)s->rows.w * TLSPHI_ROW, lap_p = (size_t)s->rows.lap_p * TLSPHI_ROW;
+    const tlsph_real rho = s->materials->rho, c = s->materials->c_linear, *a = tlsphi_at(s, 0, base);
+    const tlsph_real eta2 = TLSPHI_R(s->harmonic), eta4 = TLSPHI_R(s->biharmonic);
+    for (size_t k = graph->first[tile]; k < graph->first[tile + 1]; k++) {
+        const tlsphi_slot *slot = graph->slot + k;
+        const size_t row = (size_t)slot->pattern * (size_t)graph->width + (size_t)graph->laplacian;
+        const tlsph_real *l_ab = graph->pattern + row * TLSPHI_LANES;
+        const tlsph_real *b = tlsphi_gather(s, block, graph, slot, s->rows.w, s->rows.w + dim);
+        if (slot->scattered) tlsphi_gather(s, block, graph, slot, s->rows.lap_p, s->rows.lap_p + dim);
+        TLSPHI_EACH_LANE for (size_t l = 0; l < TLSPHI_LANES; l++) {
+            tlsph_real jump[3], lap[3], Dw[3];
+            tlsphi_damping flux;
+            TLSPHI_UNROLL for (size_t i = 0; i < D; i++) {
+                Dw[i] = b[w + i * TLSPHI_ROW + l] - a[w + i * TLSPHI_ROW + l];
+                jump[i] = rho * Dw[i];
+                lap[i] = b[lap_p + i * TLSPHI_ROW + l] - a[lap_p + i * TLSPHI_ROW + l];
+            }
+            tlsphi_jst_flux(dim, l_ab[l] * c, eta2, eta4, jump, lap, Dw, &flux);
+            TLSPHI_UNROLL for (size_t i = 0; i < D; i++) sum->damped[i * TLSPHI_LANES + l] += flux.D_p[i];
+            sum->production[l] += flux.production;
+        }
+    }
+}
 static int tlsphi_any_front(const tlsphi_lane_sums *sum) {
     int any = 0;
     for (size_t l = 0; l < TLSPHI_LANES; l++) any |= sum->approach[l] < 0;
@@ -6320,6 +6401,9 @@ static void tlsphi_flux_tile(const tlsph_solver *s, tlsphi_block *block, size_t 
     tlsphi_clear_damping(sum);
     if (rest) tlsphi_add_slots(s, block, tile, base, TLSPHI_PLAIN, rest, sum);
     if (metal) tlsphi_add_slots(s, block, tile, base, TLSPHI_METALS, TLSPHI_DAMPING, sum);
+    const int jst = (parts & TLSPHI_DAMPING) && s->dissipation == TLSPH_JST;
+    if (jst && s->dim == 3) tlsphi_add_jst(s, block, tile, base, 3, sum);
+    else if (jst) tlsphi_add_jst(s, block, tile, base, 2, sum);
     const int split = (parts & TLSPHI_STRESSES) && s->bonds && s->force_form == TLSPH_ADJOINT;
     if (split && s->dim == 3) tlsphi_add_rests(s, block, tile, base, 3, sum->T);
     else if (split) tlsphi_add_rests(s, block, tile, base, 2, sum->T);
@@ -7292,7 +7376,7 @@ static void tlsphi_right_hand_side(tlsphi_projection *p) {
     tlsphi_surface_velocities(s, s->time + stage->start * dt);
     tlsphi_run(s, tlsphi_gradient_block);
     if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block);
-    if (s->laplacian && s->damps) tlsphi_run(s, tlsphi_laplacian_block);
+    if (s->lean && s->damps) tlsphi_run(s, tlsphi_laplacian_block);
     if (s->dissipation == TLSPH_SELF_ADJOINT) tlsphi_run(s, tlsphi_adjoint_block);
     tlsphi_run_tasks(s, tlsphi_flux_task, p);
     tlsphi_collect_sums(s, stage->rate_weight * dt);
@@ -8323,7 +8407,7 @@ static void tlsphi_leap_gradients(tlsphi_projection *p, int damps) {
 static void tlsphi_leap_forces(tlsphi_projection *p) {
     tlsph_solver *s = p->s;
     if (s->sharp) tlsphi_run(s, tlsphi_sharpen_block); /* the stress of the half */
-    if (s->laplacian) tlsphi_run(s, tlsphi_laplacian_block);
+    if (s->lean) tlsphi_run(s, tlsphi_laplacian_block);
     if (s->rate_J) memset(s->rate_J, 0, s->n * sizeof *s->rate_J);
     if (s->rate_E) memset(s->rate_E, 0, s->n * sizeof *s->rate_E);
     if (s->projection) tlsphi_find_moments(p);
@@ -9577,10 +9661,11 @@ typedef struct tlsphi_tiler {
     double *g;                /* lanes x most x D */
     tlsph_real *size, *along; /* lanes x most: |C_ab|, C_ab . d_ab */
     tlsph_real *raw;          /* lanes x most x D, with bonds: C_ab itself */
+    tlsph_real *laplacian;    /* lanes x most: l_ab */
     uint8_t *done, *axes;     /* lanes x most; axes: as in tlsphi_slot */
     size_t slot_room, gather_room;
     tlsphi_patterns patterns;
-    tlsph_real pattern[7 * TLSPHI_LANES];
+    tlsph_real pattern[8 * TLSPHI_LANES];
     unsigned slot_axes;
 } tlsphi_tiler;
 
@@ -9685,6 +9770,9 @@ static int tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         if (plan->correction) tlsphi_round_vectors(plan, &along, 1);
         t->size[lane * t->most + i] = (tlsph_real)size;
         t->along[lane * t->most + i] = (tlsph_real)(along * plan->h);
+        double laplacian = tlsphi_dmax(tlsphi_dot3(C, d), 0) / tlsphi_dot3(d, d) * plan->h; /* as large as an area */
+        tlsphi_round_vectors(plan, &laplacian, 1);
+        t->laplacian[lane * t->most + i] = (tlsph_real)(laplacian / plan->h);
         for (size_t k = 0; k < D && plan->antisymmetric; k++) g[D * i + k] = C[k];
         t->axes[lane * t->most + i] = 0;
         for (size_t k = 0; k < D; k++) {
@@ -9706,7 +9794,8 @@ static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
     t->pattern[D * TLSPHI_LANES + lane] = t->size[at];
     if (t->raw)
         for (size_t k = 0; k < D; k++) t->pattern[(D + 1 + k) * TLSPHI_LANES + lane] = t->raw[D * at + k];
-    else if (t->graph->width == t->plan->dim + 2) t->pattern[(D + 1) * TLSPHI_LANES + lane] = t->along[at];
+    else if (t->graph->along) t->pattern[(D + 1) * TLSPHI_LANES + lane] = t->along[at];
+    if (t->graph->laplacian) t->pattern[(size_t)t->graph->laplacian * TLSPHI_LANES + lane] = t->laplacian[at];
 }
 /* Closes a slot: the pattern is set; `from` is the first neighbour, or, scattered, the place of the list. */
 static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
@@ -9786,20 +9875,24 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->damped = damped;
     t->graph = plan->graph + damped;
     const int compact = plan->desc->thermal && plan->desc->conduction == TLSPH_COMPACT;
-    t->graph->width = plan->dim + (plan->bond ? plan->dim + 1 : compact && !plan->antisymmetric ? 2 : 1);
     t->graph->raw = plan->bond ? plan->dim + 1 : 0;
+    t->graph->along = compact && !plan->antisymmetric && !plan->bond;
+    t->graph->width = plan->dim + 1 + (plan->bond ? plan->dim : t->graph->along);
+    if (plan->desc->dissipation == TLSPH_JST) t->graph->laplacian = t->graph->width++;
     t->most = plan->most;
     t->list = TLSPHI_SCRATCH(plan, uint32_t, all);
     t->g = TLSPHI_SCRATCH(plan, double, D * all);
     t->size = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->along = TLSPHI_SCRATCH(plan, tlsph_real, all);
     if (plan->bond) t->raw = TLSPHI_SCRATCH(plan, tlsph_real, D * all);
+    t->laplacian = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->done = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->axes = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->patterns.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     for (size_t a = 0; a < n; a++) t->graph->tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
     t->graph->first = TLSPHI_SCRATCH(plan, size_t, t->graph->tiles + 1);
-    if (!t->list || !t->g || !t->size || !t->along || (plan->bond && !t->raw) || !t->done || !t->axes || !t->patterns.seen || !t->graph->first)
+    if (!t->list || !t->g || !t->size || !t->along || (plan->bond && !t->raw) || !t->laplacian ||
+        !t->done || !t->axes || !t->patterns.seen || !t->graph->first)
         return tlsphi_no_memory(plan, 64.0 * (double)all);
     for (size_t tile = 0; t->end < n; tile++) {
         t->begin = t->end;
@@ -10024,8 +10117,9 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->rows.lap_p = s->rows.count;
         s->rows.count += s->dim;
     }
-    s->lanes = s->dissipation != TLSPH_AS_PRINTED && s->dissipation != TLSPH_JST && !(s->bonds && s->conducts) &&
-               !s->audit && (!s->metal || s->dissipation == TLSPH_LIMITED || s->dissipation == TLSPH_NO_DISSIPATION);
+    s->lanes = s->dissipation != TLSPH_AS_PRINTED && !(s->dissipation == TLSPH_JST && s->material_count > 1) &&
+               !(s->bonds && s->conducts) && !s->audit && 
+               !(s->metal && (s->dissipation == TLSPH_RECONSTRUCTED || s->dissipation == TLSPH_FIRST_ORDER));
     s->heat_moves = s->conducts;
     s->keeps_pairs = d->keep_pairs || !s->lanes || s->incompressible || d->particles.moments ||
                      s->step_rule != TLSPH_STEP_BY_PARTICLE;
@@ -10157,7 +10251,7 @@ static void tlsphi_layout(tlsph_solver *s, tlsphi_arena *arena, const tlsphi_pla
     s->damped_g = apart ? TLSPHI_TAKE(arena, tlsph_real, D * plan->damped_pairs) : s->g;
     s->image = TLSPHI_TAKE(arena, tlsphi_image, s->images);
     if (s->bonds && s->keeps_pairs) s->rest = TLSPHI_TAKE(arena, tlsph_real, D * s->pairs);
-    if (s->dissipation == TLSPH_JST) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
+    if (s->dissipation == TLSPH_JST && s->keeps_pairs) s->laplacian = TLSPHI_TAKE(arena, tlsph_real, s->pairs);
     tlsphi_layout_graph(arena, plan->graph, &s->graph);
     if (s->super.most && s->conduction == TLSPH_COMPACT && !s->bonds)
         s->super.conductance = TLSPHI_TAKE(arena, tlsph_real, TLSPHI_LANES * plan->graph->slots);
@@ -10276,17 +10370,18 @@ static void tlsphi_fill_laplacian(tlsph_solver *s) {
     for (size_t a = 0; s->laplacian && a < s->n; a++)
         for (size_t k = s->first[a]; k < s->first[a + 1]; k++)
             s->laplacian[k] = tlsphi_pair_laplacian(s, a, s->neighbour[k], k);
-    for (size_t a = 0; s->laplacian && a < s->n; a++) {
-        tlsph_real lean[3], turned[3], sum = 0;
-        for (size_t k = s->first[a]; k < s->first[a + 1]; k++) sum += s->laplacian[k];
-        const double bound = 2 * (double)(sum / s->V[a]), c = (double)tlsphi_material_of(s, a)->c_linear;
-        fastest = tlsphi_dmax(fastest, c * bound * (s->harmonic + s->biharmonic * bound));
-        tlsphi_laplacian_lean(s, a, lean, turned);
-        for (size_t i = 0; i < D; i++) {
-            s->lean[2 * D * a + i] = turned[i];
-            s->lean[2 * D * a + D + i] = lean[i];
-        }
-    }
+    for (size_t i = 0; s->lean && i < s->blocks; i++)
+        for (size_t a = s->block[i].begin, tile = s->block[i].tile, end; a < s->block[i].end; tile++)
+            for (end = tlsphi_tile_end(s->block + i, a); a < end; a++) {
+                tlsph_real lean[3], turned[3];
+                const tlsph_real sum = tlsphi_laplacian_lean(s, tile, a, lean, turned);
+                const double bound = 2 * (double)(sum / s->V[a]), c = (double)tlsphi_material_of(s, a)->c_linear;
+                fastest = tlsphi_dmax(fastest, c * bound * (s->harmonic + s->biharmonic * bound));
+                for (size_t k = 0; k < D; k++) {
+                    s->lean[2 * D * a + k] = turned[k];
+                    s->lean[2 * D * a + D + k] = lean[k];
+                }
+            }
     s->jst_step = fastest > 0 && s->step_rule == TLSPH_STEP_BY_PARTICLE ? TLSPHI_JST_STEP / fastest : TLSPHI_LARGEST;
 }
 /* Where materials meet, a particle feels half of its neighbour's stiffness M = rho c_p^2 and conductivity with its own mass

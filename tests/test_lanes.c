@@ -247,6 +247,18 @@ TEST(metals)
     REPORT(" %.1e", worst);
 }
 
+/* Harmonic and biharmonic, on lattices, clouds and bonds. */
+TEST(jst)
+{
+    for (int i = 0; i < 6; i++) {
+        moving_block s = body(2 + i % 2, i < 2 ? 0 : 0.1);
+        s.dissipation = TLSPH_JST;
+        s.kind = i < 4 ? (tlsph_operator_kind)0 : TLSPH_FIRST_KERNEL;
+        s.integrator = i == 3 ? TLSPH_LEAPFROG : TLSPH_RK2;
+        compare_all(s, 0.5);
+    }
+}
+
 TEST(other_dissipations)
 {
     static const tlsph_dissipation kinds[] = { TLSPH_RECONSTRUCTED, TLSPH_FIRST_ORDER, TLSPH_NO_DISSIPATION,
@@ -325,5 +337,5 @@ TEST(temperatures_of_round_off)
 
 SUITE(lanes, ENTRY(lattices), ENTRY(clouds), ENTRY(mirrors), ENTRY(fronts), ENTRY(fronts_that_were_not_known),
       ENTRY(leapfrog), ENTRY(frozen_dissipation), ENTRY(sharp_gradients),
-      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(bonds), ENTRY(metals), ENTRY(other_dissipations),
+      ENTRY(sharp_gradients_of_clouds), ENTRY(sharp_gradients_of_J), ENTRY(bonds), ENTRY(metals), ENTRY(jst), ENTRY(other_dissipations),
       ENTRY(temperature_of_entropy), ENTRY(temperatures_of_round_off))
