@@ -2379,16 +2379,19 @@ static void tlsphi_pair_vectors(const tlsphi_plan *plan, size_t a, size_t b, con
         tlsphi_bond_vector(plan, a, b, bonds, mine);
         tlsphi_bond_vector(plan, b, a, bonds, other);
         for (int i = 0; i < 3; i++) other[i] = -other[i];
+        tlsphi_round_vectors(plan, mine, 3);
+        tlsphi_round_vectors(plan, other, 3);
         if (bonds && plan->desc->force_form == TLSPH_FORCE_AS_PRINTED) {
             double back[3];
             tlsphi_bond_vector(plan, a, b, 0, middle);
             tlsphi_bond_vector(plan, b, a, 0, back);
             for (int i = 0; i < 3; i++) middle[i] = (middle[i] - back[i]) / 2;
+            tlsphi_round_vectors(plan, middle, 3);
             return;
         }
     }
     for (int i = 0; i < 3; i++) middle[i] = (mine[i] + other[i]) / 2;
-    if (plan->correction && plan->antisymmetric) tlsphi_round_vectors(plan, middle, 3);
+    if ((plan->correction && plan->antisymmetric) || plan->bond) tlsphi_round_vectors(plan, middle, 3);
 }
 
 /* -- bodies and order -- */

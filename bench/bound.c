@@ -3,8 +3,8 @@ bound.c - what a right-hand side moves and calculates at least, to judge its tim
 
   Bytes are counted by the solver's own arrays, in reals a particle: each array that a pass reads or writes once, as if
   nothing stayed in a cache from one pass to the next and all of a neighbour's did within a pass. As STREAM does, this
-  leaves out that a line is read before it is written. Two-stage schemes; other passes (sharp gradients, the adjoint
-  dissipation, JST) are not counted.
+  leaves out that a line is read before it is written. Two-stage schemes; other passes (sharp gradients, bonds, metals,
+  the adjoint dissipation, JST) are not counted.
 */
 #define TLSPH_IMPLEMENTATION /* for the solver's insides; the solvers are those of the library */
 #define TLSPH_STATIC
@@ -38,7 +38,7 @@ static double of_sums(const tlsph_solver *s) {
     return s->rows.count + 1 + rates + turn + slots / (double)sizeof(tlsph_real) / (double)s->n;
 }
 static int counted(const tlsph_solver *s) {
-    return !s->sharp && s->dissipation != TLSPH_SELF_ADJOINT && s->dissipation != TLSPH_JST;
+    return !s->sharp && !s->metal && !s->bonds && s->dissipation != TLSPH_SELF_ADJOINT && s->dissipation != TLSPH_JST;
 }
 double bound_bytes(const tlsph_solver *s) {
     return counted(s) ? (double)sizeof(tlsph_real) * (of_update(s) + of_moments(s) + of_sums(s)) : 0;
