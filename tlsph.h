@@ -1519,9 +1519,10 @@ typedef struct tlsphi_graph {
     size_t *first; /* slot of each tile; tiles in the order of the blocks */
     tlsphi_slot *slot;
     uint32_t *gathered;
-    int width, along;    /* D + 1; along: with C_ab . d_ab, which compact conduction needs where C is not g; 2 D + 1 with */
-    int raw;             /* bonds, whose gradients take C_ab itself, from the row `raw` = D + 1 on; else raw = 0; */
-    int laplacian;       /* with TLSPH_JST one more, the row of l_ab; else 0 */
+    int width;           /* rows of a pattern: g_ab, |C_ab|, and what else a scene needs: */
+    int along;           /* 1: C_ab . d_ab, which compact conduction takes where C is not g */
+    int raw;             /* first row of C_ab itself, which gradients take with bonds; 0: they take g */
+    int laplacian;       /* row of l_ab, with TLSPH_JST; or 0 */
     tlsph_real *pattern; /* width x lanes each */
 } tlsphi_graph;
 
