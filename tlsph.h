@@ -6202,7 +6202,7 @@ TLSPHI_INLINE void tlsphi_damp_lanes(const tlsphi_rows *r, const tlsph_real *a, 
 static const tlsph_real *tlsphi_mask_slot(const tlsph_solver *s, const tlsphi_graph *graph, const tlsphi_slot *slot,
                                           size_t base, int dim, const tlsph_real *g, tlsph_real *out) {
     for (size_t l = 0; l < TLSPHI_LANES; l++) {
-        const size_t a = base + l, b = slot->scattered ? graph->gathered[slot->from + l] : slot->from + l;
+        const size_t a = base + l, b = tlsphi_slot_neighbour(graph, slot, l);
         const int level_a = a < s->n ? s->rates.of[a] : 0, level_b = b < s->n ? s->rates.of[b] : 0;
         const int in = (level_a > level_b ? level_a : level_b) == s->rates.level;
         for (size_t i = 0; i <= (size_t)dim; i++) out[i * TLSPHI_LANES + l] = in ? g[i * TLSPHI_LANES + l] : 0;
@@ -9774,9 +9774,11 @@ static int tlsphi_tile_lane(tlsphi_tiler *t, size_t a) {
         if (plan->correction) tlsphi_round_vectors(plan, &along, 1);
         t->size[lane * t->most + i] = (tlsph_real)size;
         t->along[lane * t->most + i] = (tlsph_real)(along * plan->h);
-        double laplacian = tlsphi_dmax(tlsphi_dot3(C, d), 0) / tlsphi_dot3(d, d) * plan->h; /* as large as an area */
-        tlsphi_round_vectors(plan, &laplacian, 1);
-        t->laplacian[lane * t->most + i] = (tlsph_real)(laplacian / plan->h);
+        if (t->laplacian) {
+            double laplacian = tlsphi_dmax(tlsphi_dot3(C, d), 0) / tlsphi_dot3(d, d) * plan->h; /* as large as an area */
+            tlsphi_round_vectors(plan, &laplacian, 1);
+            t->laplacian[lane * t->most + i] = (tlsph_real)(laplacian / plan->h);
+        }
         for (size_t k = 0; k < D && plan->antisymmetric; k++) g[D * i + k] = C[k];
         t->axes[lane * t->most + i] = 0;
         for (size_t k = 0; k < D; k++) {
@@ -9799,7 +9801,7 @@ static void tlsphi_tile_take(tlsphi_tiler *t, size_t lane, size_t i) {
     if (t->raw)
         for (size_t k = 0; k < D; k++) t->pattern[(D + 1 + k) * TLSPHI_LANES + lane] = t->raw[D * at + k];
     else if (t->graph->along) t->pattern[(D + 1) * TLSPHI_LANES + lane] = t->along[at];
-    if (t->graph->laplacian) t->pattern[(size_t)t->graph->laplacian * TLSPHI_LANES + lane] = t->laplacian[at];
+    if (t->laplacian) t->pattern[(size_t)t->graph->laplacian * TLSPHI_LANES + lane] = t->laplacian[at];
 }
 /* Closes a slot: the pattern is set; `from` is the first neighbour, or, scattered, the place of the list. */
 static int tlsphi_tile_emit(tlsphi_tiler *t, size_t from, uint32_t scattered) {
@@ -9889,14 +9891,14 @@ static tlsph_result tlsphi_graph_build(tlsphi_plan *plan, int damped) {
     t->size = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->along = TLSPHI_SCRATCH(plan, tlsph_real, all);
     if (plan->bond) t->raw = TLSPHI_SCRATCH(plan, tlsph_real, D * all);
-    t->laplacian = TLSPHI_SCRATCH(plan, tlsph_real, all);
+    if (t->graph->laplacian) t->laplacian = TLSPHI_SCRATCH(plan, tlsph_real, all);
     t->done = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->axes = TLSPHI_SCRATCH(plan, uint8_t, all);
     t->patterns.seen = TLSPHI_SCRATCH(plan, uint32_t, TLSPHI_PATTERNS_SEEN);
     for (size_t a = 0; a < n; a++) t->graph->tiles += tlsphi_tile_begins(plan, a) ? 1 : 0;
     t->graph->first = TLSPHI_SCRATCH(plan, size_t, t->graph->tiles + 1);
-    if (!t->list || !t->g || !t->size || !t->along || (plan->bond && !t->raw) || !t->laplacian ||
-        !t->done || !t->axes || !t->patterns.seen || !t->graph->first)
+    if (!t->list || !t->g || !t->size || !t->along || (plan->bond && !t->raw) ||
+        (t->graph->laplacian && !t->laplacian) || !t->done || !t->axes || !t->patterns.seen || !t->graph->first)
         return tlsphi_no_memory(plan, 64.0 * (double)all);
     for (size_t tile = 0; t->end < n; tile++) {
         t->begin = t->end;
