@@ -3395,7 +3395,8 @@ TLSPHI_INLINE tlsph_real tlsphi_plastic_work(const tlsphi_material *m, tlsph_rea
     return strain * (m->yield + m->hardening * strain / 2);
 }
 /* Symmetric tensors here are their entries 11, 22, 33, 12, 13, 23, in double also for float: a yield strain is a few
-   thousandths. All nine: */
+   thousandths. Their places among all nine; and all nine: */
+static const int tlsphi_symmetric_slot[6] = {0, 4, 8, 1, 2, 5};
 static void tlsphi_symmetric_expand(const double S[6], double out[9]) {
     static const int slot[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};
     for (int i = 0; i < 9; i++) out[i] = S[slot[i]];
@@ -3411,8 +3412,9 @@ TLSPHI_INLINE void tlsphi_times_and_add(double square, double third, double add,
     part[2] = part[1];
     part[1] = linear;
 }
-/* out = ln(I + X) or exp X - I for a small symmetric X without trace, by twelve terms of the power series. Its powers stay
-   in the span of I, X and X^2 (Cayley-Hamilton: X^3 = tr X^2/2 X + det X I), so that Horner's scheme takes three numbers. */
+/* out = ln(I + X) or exp X - I for a small symmetric X without trace, by twelve terms of the power series. Its powers
+   stay in the span of I, X and X^2 (Cayley-Hamilton: X^3 = tr X^2/2 X + det X I), so that Horner's scheme takes three
+   numbers. */
 #define TLSPHI_SMALL 0.03 /* largest (X : X/2)^(1/2): 0.05^13 is below round-off */
 TLSPHI_INLINE void tlsphi_power_series(const int exponential, const double X[6], double out[6]) {
     static const double logarithm[12] = {1, -1. / 2, 1. / 3, -1. / 4, 1. / 5, -1. / 6, 1. / 7, -1. / 8, 1. / 9, -1. / 10,
@@ -3477,10 +3479,9 @@ TLSPHI_INLINE void tlsphi_elastic_deviator(double e[6], double *square) {
     *square = 3 * tlsphi_half_square(e);
 }
 static void tlsphi_elastic_strain(const tlsph_real *F, const tlsphi_plastic *plastic, tlsphi_elastic *out) {
-    static const int slot[6] = {0, 4, 8, 1, 2, 5};
     double F_d[9], C[6], X[6], square;
     for (int i = 0; i < 9; i++) F_d[i] = (double)F[i];
-    for (int i = 0; i < 6; i++) C[i] = (double)plastic->C[slot[i]];
+    for (int i = 0; i < 6; i++) C[i] = (double)plastic->C[tlsphi_symmetric_slot[i]];
     tlsphi_elastic_left(F_d, C, X);
     tlsphi_symmetric_function(0, X, out->e);
     tlsphi_elastic_deviator(out->e, &square);
@@ -3542,16 +3543,15 @@ static int tlsphi_return_map(const tlsphi_material *m, const tlsph_real *F, tlsp
 static size_t tlsphi_plastic_reals(int dim, int thermal) { return (dim == 3 ? 7u : 5u) + (thermal ? 1u : 0u); }
 static void tlsphi_load_plastic(int dim, int thermal, const tlsph_real *at, tlsphi_plastic *out) {
     const int entries = dim == 3 ? 6 : 4;
-    static const int slot[6] = {0, 4, 8, 1, 2, 5}, mirrored[6] = {0, 4, 8, 3, 6, 7};
+    static const int mirrored[6] = {0, 4, 8, 3, 6, 7};
     *out = tlsphi_virgin;
-    for (int k = 0; k < entries; k++) out->C[slot[k]] = out->C[mirrored[k]] = at[k];
+    for (int k = 0; k < entries; k++) out->C[tlsphi_symmetric_slot[k]] = out->C[mirrored[k]] = at[k];
     out->strain = at[entries];
     if (thermal) out->entropy = at[entries + 1];
 }
 static void tlsphi_store_plastic(int dim, int thermal, const tlsphi_plastic *plastic, tlsph_real *at) {
     const int entries = dim == 3 ? 6 : 4;
-    static const int slot[6] = {0, 4, 8, 1, 2, 5};
-    for (int k = 0; k < entries; k++) at[k] = plastic->C[slot[k]];
+    for (int k = 0; k < entries; k++) at[k] = plastic->C[tlsphi_symmetric_slot[k]];
     at[entries] = plastic->strain;
     if (thermal) at[entries + 1] = plastic->entropy;
 }
@@ -4305,7 +4305,6 @@ static void tlsphi_publish(tlsph_solver *s, size_t a, const tlsphi_point *pt) {
 /* Elastic strains of the particles [begin, end) of a tile, by lanes where they are small, as they are in most metals. */
 static void tlsphi_elastic_strains(const tlsph_solver *s, const tlsph_real *plastic, size_t begin, size_t end,
                                    tlsphi_elastic *out) {
-    static const int slot[6] = {0, 4, 8, 1, 2, 5};
     const size_t reals = tlsphi_plastic_reals(s->dim, s->thermal), count = end - begin;
     tlsph_real F[TLSPHI_LANES][9];
     tlsphi_plastic at[TLSPHI_LANES];
@@ -4315,7 +4314,7 @@ static void tlsphi_elastic_strains(const tlsph_solver *s, const tlsph_real *plas
         tlsphi_tensor_expand(s->now.F, s->dim, begin + l, 1, F[l]);
         tlsphi_load_plastic(s->dim, s->thermal, plastic + reals * (begin + l), at + l);
         for (size_t i = 0; i < 9; i++) F_of[i * TLSPHI_LANES + l] = (double)F[l][i];
-        for (size_t i = 0; i < 6; i++) C_of[i * TLSPHI_LANES + l] = (double)at[l].C[slot[i]];
+        for (size_t i = 0; i < 6; i++) C_of[i * TLSPHI_LANES + l] = (double)at[l].C[tlsphi_symmetric_slot[i]];
     }
     for (size_t l = count; l < TLSPHI_LANES; l++) /* no particle: F = C = I */
         for (size_t i = 0; i < 3; i++) F_of[4 * i * TLSPHI_LANES + l] = C_of[i * TLSPHI_LANES + l] = 1;
@@ -4810,10 +4809,10 @@ static void tlsphi_pair_step_block(tlsph_solver *s, tlsphi_block *block) {
 #define TLSPHI_FRONT_LOW 0.0015 /* approach over p speed from which a pair may be a front; full strength at twice it */
 #define TLSPHI_FRONT_GAIN 4 /* on symmetric impacts at 0.1 and 0.3 c_p: overshoot 2 to 3 %, 25 to 45 % without */
 
-/* The limiter. One that drops Dr or keeps it whole, by the sign of Dr . Dv, is as accurate; but by symmetry Dv may be 0 but for
-   round-off where Dr is not. Chance then throws the switch, and a symmetric body loses its symmetry: punch_test at CFL 0.5 by
-   1 % after 0.42 s, against 1e-7 with this continuous one, and energy and entropy form differed by 1.5 % instead of 0.04 %.
-   Nor is the jump ever more than the raw one, that of the first-order dissipation. */
+/* The limiter. One that drops Dr or keeps it whole, by the sign of Dr . Dv, is as accurate; but by symmetry Dv may be 0
+   but for round-off where Dr is not. Chance then throws the switch, and a symmetric body loses its symmetry: punch_test at
+   CFL 0.5 by 1 % after 0.42 s, against 1e-7 with this continuous one, and energy and entropy form differed by 1.5 %
+   instead of 0.04 %. Nor is the jump ever more than the raw one, that of the first-order dissipation. */
 
 /* The share of t that is damped: product = t . Dv, square = t . t. */
 TLSPHI_INLINE tlsph_real tlsphi_limited_share(tlsph_real product, tlsph_real square) {
@@ -6277,7 +6276,7 @@ TLSPHI_INLINE void tlsphi_flux_slots(const tlsph_solver *s, const tlsphi_block *
 }
 #define TLSPHI_FLUX_SLOTS(dim, J, mode)                                                                                \
     static void tlsphi_flux_slots_##dim##J##mode(const tlsph_solver *s, const tlsphi_block *block, size_t tile,        \
-                                                   size_t base, int parts, tlsphi_lane_sums *sum) {                      \
+                                                   size_t base, int parts, tlsphi_lane_sums *sum) {                    \
         tlsphi_flux_slots(s, block, tile, base, dim, J, mode, parts, sum);                                             \
     }
 #define TLSPHI_EACH_FLUX(X)                                                                                            \
@@ -10124,7 +10123,7 @@ static void tlsphi_copy_options(tlsph_solver *s, const tlsphi_plan *plan) {
         s->rows.count += s->dim;
     }
     s->lanes = s->dissipation != TLSPH_AS_PRINTED && !(s->dissipation == TLSPH_JST && s->material_count > 1) &&
-               !(s->bonds && s->conducts) && !s->audit && 
+               !(s->bonds && s->conducts) && !s->audit &&
                !(s->metal && (s->dissipation == TLSPH_RECONSTRUCTED || s->dissipation == TLSPH_FIRST_ORDER));
     s->heat_moves = s->conducts;
     s->keeps_pairs = d->keep_pairs || !s->lanes || s->incompressible || d->particles.moments ||

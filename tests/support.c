@@ -249,6 +249,7 @@ tlsph_result moving_block_create(const moving_block *s, tlsph_solver **solver, t
     uint32_t *sets;
     *solver = NULL;
     if (s->mooney > 0) material.mooney_fraction = R(s->mooney);
+    if (s->insulated) material.conductivity = 0;
     cells[0] = cells[1] = cells[2] = s->cells;
     if (!own_box(&cloud, s->dimension, cells, 1.0 / s->cells, s->jitter)) return result;
     sets = malloc(2 * cloud.particles.count * sizeof *sets);

@@ -64,6 +64,7 @@ typedef struct moving_block {
     int sharp;               /* sharp gradients, by cells */
     tlsph_operator_kind kind; /* if not 0 */
     tlsph_force_form force_form;
+    int insulated;            /* 1: no conduction */
     int slides;              /* 1: along a roller at X = 0, not clamped */
     int unloaded;            /* 1: only clamped; 2: and above a wall out of reach */
     tlsph_run_fn run; void *run_user;
